@@ -38,7 +38,6 @@ class Benchmark:
         more_seeds: what the help says of the number of seeds, besides the default.
         sensors: whether they can be chosen.
         runs: how often a study that draws nothing is run, one after the other; 0 for seeds.
-        jobs: processes of such runs; 0 for none but this one.
     """
 
     name: str
@@ -49,7 +48,6 @@ class Benchmark:
     more_seeds: str = ""
     sensors: bool = False
     runs: int = 0
-    jobs: int = 1
 
     def register(self, subparsers: Subparsers) -> None:
         """Add the command and its options."""
@@ -68,7 +66,7 @@ class Benchmark:
             text = f"{', '.join(names)}; default: all"
             parser.add_argument("names", metavar="NAME", nargs="*", help=text)
             add_options(parser, "runs", "list", *RESULTS)
-            parser.set_defaults(runs=self.runs, jobs=self.jobs)
+            parser.set_defaults(runs=self.runs, jobs=1)
         else:
             sensors = ("sensors",) if self.sensors else ()
             add_options(parser, *sensors, *SEEDED, more_seeds=self.more_seeds)

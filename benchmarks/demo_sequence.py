@@ -65,21 +65,19 @@ class StepCheck:
 
     def __init__(self, robot: TrialRobot) -> None:
         """Check ``robot``'s demo."""
-        self._robot = robot
-        self._before = robot.plant.truth()
+        self._robot, self._before = robot, robot.plant.truth()
         self.untrue: list[str] = []
 
     def __call__(self, progress: DemoProgress) -> None:
         """Take note of a step's begin, or check its end."""
-        if progress.result is None:
+        if (result := progress.result) is None:
             self._before = self._robot.plant.truth()
             self._robot.truth.clear()
-        elif progress.result.ok:
-            name = progress.result.name
-            failure = self._robot.truth.fall() if "sit" not in name else None
-            failure = failure or CRITERIA[name](self._robot, self._before)
+        elif result.ok:
+            failure = self._robot.truth.fall() if "sit" not in result.name else None
+            failure = failure or CRITERIA[result.name](self._robot, self._before)
             if failure is not None:
-                self.untrue.append(f"{name}: {failure}")
+                self.untrue.append(f"{result.name}: {failure}")
 
 
 def _stand(robot: TrialRobot, _before: RobotState) -> str | None:

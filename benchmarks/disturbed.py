@@ -106,14 +106,15 @@ class Watch:
         mode, now = self._robot.go2.mode, self._robot.plant.time
         if now >= self._next:
             self._push(now)
-        if mode in DOWN:
-            has_fallen = mode is Mode.FALLEN or math.isfinite(self._fell)
-            if has_fallen and self._said not in DOWN:
-                self._note(now)
+        if mode not in DOWN:
+            self._judge(mode, now)
+        else:
+            if (mode is Mode.FALLEN or math.isfinite(self._fell)) and self._said not in DOWN:
+                fell = min(self._fell, now)
+                before = self._said if math.isinf(self._fell) else self._fell_as
+                self.falls.append(Fall(fell, now - fell, before, self.call))
             self._touches_since = self._fell = self._stands_since = math.inf
             self._has_risen = False
-        else:
-            self._judge(mode, now)
         self._said = mode
 
     def _push(self, now: float) -> None:
@@ -125,11 +126,6 @@ class Watch:
             where = str(rng.choice(PUSHED))
         plant.push(force, PUSH_TIME, where)
         self._next = now + float(rng.uniform(*PAUSE))
-
-    def _note(self, now: float) -> None:
-        fell = min(self._fell, now)
-        as_ = self._said if math.isinf(self._fell) else self._fell_as
-        self.falls.append(Fall(fell, now - fell, as_, self.call))
 
     def _judge(self, mode: Mode, now: float) -> None:
         plant = self._robot.plant

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -42,27 +42,18 @@ def measure_impulses(rows: Rows, failure_of: FailureOf, found: TrialResult) -> N
     first = 0.0
     for name, quantity, bar in rows:
         threshold = Metric.of(name, "", quantity, bar).threshold
-        first = threshold or first
-        largest, reason = _search(DIRECTIONS[name], first, failure_of)
-        found.values[name] = largest
+        first, failures = threshold or first, dict[float, str]()
+
+        def survives(impulse: float, name: str = name, lost: dict[float, str] = failures) -> bool:
+            for direction in DIRECTIONS[name]:
+                if failure := failure_of(impulse, direction):
+                    lost[impulse] = f"{impulse:g} N s {direction}: {failure}"
+                    return False
+            return True
+
+        largest = found.values[name] = largest_impulse(survives, first)
         if threshold is not None and largest < threshold:
-            found.failures[name] = reason
-
-
-def _search(directions: Sequence[str], first: float, failure_of: FailureOf) -> tuple[float, str]:
-    """The largest impulse [N s] that is survived, and why the least of the others is not."""
-    failures: dict[float, str] = {}
-
-    def survives(impulse: float) -> bool:
-        for direction in directions:
-            failure = failure_of(impulse, direction)
-            if failure is not None:
-                failures[impulse] = f"{impulse:g} N s {direction}: {failure}"
-                return False
-        return True
-
-    largest = largest_impulse(survives, first)
-    return largest, failures[min(failures)] if failures else ""
+            found.failures[name] = failures[min(failures)]
 
 
 def largest_impulse(survives: Callable[[float], bool], first: float) -> float:
