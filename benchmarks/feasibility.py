@@ -17,7 +17,15 @@ from benchmarks.command import RESULTS, add_options, measure_all, positive, publ
 from benchmarks.study import Study, TrialResult
 from benchmarks.validation_set.causes import CAUSES, examples, render_causes
 from benchmarks.validation_set.drawing import TEST
-from benchmarks.validation_set.physics import BORDER, BORDERS, play
+from benchmarks.validation_set.physics import (
+    BORDER,
+    BORDERS,
+    BORDERS_FILE,
+    borders_version,
+    play,
+    read_borders,
+    write_borders,
+)
 from benchmarks.validation_set.questions import (
     Question,
     draw_name,
@@ -26,12 +34,6 @@ from benchmarks.validation_set.questions import (
     questions,
 )
 from benchmarks.validation_set.scores import HALVES, Case, render, scores, wrong_ones
-from benchmarks.validation_set.stored import (
-    BORDERS_FILE,
-    borders_version,
-    read_borders,
-    write_borders,
-)
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.motion_failures import FELL, LENIENT, STOPS, STRICT, MotionFailures, failures_of
 from controller.sweeps.trials import Trial

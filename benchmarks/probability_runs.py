@@ -17,10 +17,9 @@ from operator import itemgetter
 import numpy as np
 
 from benchmarks.validation_set.drawing import TEST, TRAIN
-from benchmarks.validation_set.physics import play
+from benchmarks.validation_set.physics import play, read_borders
 from benchmarks.validation_set.questions import IMPOSSIBLE, Question, questions
 from benchmarks.validation_set.random_timelines import RandomTimeline, random_timelines
-from benchmarks.validation_set.stored import read_borders
 from controller.motion_failures import FELL, failures_of
 from controller.motion_measurement import measure_motion
 from controller.sweeps.rows import Row

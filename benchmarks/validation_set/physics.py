@@ -1,17 +1,23 @@
 """What physics makes of a motion, played in MuJoCo whatever the check says.
 
-And at which amplitude it changes its mind: bisected by playing.
+And at which amplitude it changes its mind: bisected by playing, and kept in a file.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
+from collections.abc import Mapping
+from pathlib import Path
 
 from benchmarks.study import Study, TrialResult
 from benchmarks.validation_set.questions import Question, draws
 from controller.motion_failures import failures_of
 from controller.motion_measurement import MotionMeasurement, measure_motion
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
+from go2_wbc.errors import ConfigError
+from go2_wbc.files import write_atomically
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
@@ -22,6 +28,7 @@ NEAR, NEAR_SOLVED = 1.06, 1.13
 """Ratio of amplitudes, one done and one failed, at which the search ends."""
 STEP, STEP_SOLVED = 1.6, 1.25  # Ratio of amplitudes in the search for two that differ
 BORDER, PLAYS = "border", "plays"
+BORDERS_FILE = Path(__file__).parent / "borders.json"
 
 
 def play(
@@ -85,3 +92,33 @@ BORDERS = Study(
     measure_border,
     prefix="",
 )
+
+
+# --- the file of borders --------------------------------------------------------------------------
+
+
+def read_borders(path: Path = BORDERS_FILE) -> dict[str, float | None]:
+    """The amplitudes at which physics changes its mind, by draw.
+
+    Raises:
+        ConfigError: if the file is missing or damaged.
+    """
+    try:
+        kept = dict(json.loads(path.read_text()))
+    except (OSError, ValueError, TypeError) as error:
+        raise ConfigError(
+            f"{path}: cannot be read: {error}; make it anew with --borders"
+        ) from error
+    return {name: None if flip is None else float(flip) for name, flip in kept.items()}
+
+
+def borders_version(path: Path = BORDERS_FILE) -> str:
+    """A short hash of the file of borders: with others, the exam asks other questions."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:8] if path.exists() else "none"
+
+
+def write_borders(borders: Mapping[str, float | None], path: Path = BORDERS_FILE) -> None:
+    """Keep borders, one a line."""
+    rows = {name: value and round(value, 4) for name, value in borders.items()}
+    lines = (f"{json.dumps(name)}: {json.dumps(value)}" for name, value in rows.items())
+    write_atomically(path, ("{\n" + ",\n".join(lines) + "\n}\n").encode())
