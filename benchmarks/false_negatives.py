@@ -22,7 +22,7 @@ from controller.motion_failures import FELL
 from controller.sweeps.rows import Row
 from controller.sweeps.summary import rate_interval
 from go2_wbc.motion_plan import MotionPlan, Posture
-from motions import FeasibilityChecker, compile_motion, motion_names
+from motions import FeasibilityChecker, compile_motion, load_motion, motion_names
 
 PLAYS = 2000
 MOST_ASKED = 20
@@ -138,7 +138,7 @@ def _asked(number: int) -> tuple[str, str, MotionPlan]:
 @lru_cache(maxsize=1)
 def _library() -> list[str]:
     """The motions of the library that begin on four feet or sitting, shuffled."""
-    begins = {name: compile_motion(name, model()).entry for name in motion_names()}
+    begins = {name: load_motion(name).entry for name in motion_names()}
     names = [name for name, entry in begins.items() if entry in (Posture.STAND, Posture.SIT)]
     return [names[k] for k in _order(len(names))]
 

@@ -42,33 +42,28 @@ def case(refused: bool, failed: bool, stratum: str = "border") -> Case:
     return Case("a 0 1", TEST, stratum, False, refusal, BAD if failed else FINE)
 
 
-def test_the_bars_are_those_of_the_test_half() -> None:
-    right = [*(30 * [case(True, True)]), *(30 * [case(False, False)])]
-    assert judged(right, len(right))[0]
-    train = [replace(case(True, False), half=TRAIN)]
-    assert judged([*right, *train], len(right) + 1)[0]
+RIGHT = [*(50 * [case(True, True)]), *(50 * [case(False, False)])]
 
 
-@pytest.mark.parametrize("mistake", [(True, False), (False, True)])
-def test_too_many_mistakes_of_either_kind_are_not_ok(mistake: tuple[bool, bool]) -> None:
-    right = [*(30 * [case(True, True)]), *(30 * [case(False, False)])]
-    assert judged([*right, case(*mistake)], 61)[0]
-    assert not judged([*right, *(2 * [case(*mistake)])], 62)[0]
-
-
-def test_a_motion_without_a_result_is_not_ok() -> None:
-    right = [*(30 * [case(True, True)]), *(30 * [case(False, False)])]
-    is_ok, said = judged(right, len(right) + 1)
-    assert not is_ok
-    assert "1 without a result" in said
-
-
-def test_enough_dynamic_motions_must_be_foretold() -> None:
-    right = [*(50 * [case(True, True)]), *(50 * [case(False, False)])]
-    assert judged_dynamic(right, 100)[0]
-    assert not judged_dynamic(right, 101)[0], "one is lost"
-    assert not judged_dynamic(right[:99], 99)[0], "too few"
-    assert not judged_dynamic([*right, *(4 * [case(True, False)])], 104)[0]
+@pytest.mark.parametrize(
+    ("cases", "lost", "is_ok", "is_ok_dynamic"),
+    [
+        (RIGHT, 0, True, True),
+        (RIGHT, 1, False, False),
+        (RIGHT[:99], 0, True, False),  # too few
+        ([*RIGHT, replace(case(True, False), half=TRAIN)], 0, True, True),
+        ([*RIGHT, case(True, False)], 0, True, True),
+        ([*RIGHT, *(4 * [case(True, False)])], 0, False, False),
+        ([*RIGHT, *(4 * [case(False, True)])], 0, False, False),
+    ],
+)
+def test_the_bars_are_those_of_the_test_half_and_no_motion_is_lost(
+    cases: list[Case], lost: int, is_ok: bool, is_ok_dynamic: bool
+) -> None:
+    said_ok, said = judged(cases, len(cases) + lost)
+    assert said_ok is is_ok
+    assert f"{lost} without a result" in said
+    assert judged_dynamic(cases, len(cases) + lost)[0] is is_ok_dynamic
 
 
 def fake(trial: Trial, found: TrialResult, *_: object, **__: object) -> None:

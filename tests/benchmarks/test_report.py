@@ -22,21 +22,28 @@ NEEDED = {
 # --- arithmetic of a metric ---------------------------------------------------------------------
 
 
-def test_mean_and_worst_of_a_metric_that_wants_much() -> None:
-    result = summarise_metric(SPEED, measured(3.0, 0.5, 1.0))
-    assert (result.n, result.mean, result.worst, result.worst_seed) == (3, 1.5, 0.5, 1)
-    assert result.passed  # the threshold is for the mean
-
-
-def test_mean_and_worst_of_a_metric_that_wants_little() -> None:
-    result = summarise_metric(ERROR, measured(3.0, 0.5, 4.0, metric=ERROR))
-    assert (result.mean, result.worst, result.worst_seed) == (2.5, 4.0, 2)
-    assert result.passed is False
-
-
-@pytest.mark.parametrize(("metric", "mean"), [(SPEED, 1.0), (ERROR, 2.0)])
-def test_a_mean_on_the_threshold_passes(metric: Metric, mean: float) -> None:
-    assert summarise_metric(metric, measured(mean, metric=metric)).passed
+@pytest.mark.parametrize(
+    ("metric", "values", "mean", "worst", "seed", "passed"),
+    [
+        (SPEED, (3.0, 0.5, 1.0), 1.5, 0.5, 1, True),  # the threshold is for the mean
+        (ERROR, (3.0, 0.5, 4.0), 2.5, 4.0, 2, False),
+        (SPEED, (1.0,), 1.0, 1.0, 0, True),  # on the threshold
+        (ERROR, (2.0,), 2.0, 2.0, 0, True),
+        (NOTE, (5.0,), 5.0, 5.0, 0, None),
+        (SPEED, (), None, None, None, False),
+    ],
+)
+def test_the_mean_is_held_to_the_threshold_and_the_worst_seed_named(
+    metric: Metric,
+    values: tuple[float, ...],
+    mean: float | None,
+    worst: float | None,
+    seed: int | None,
+    passed: bool | None,
+) -> None:
+    result = summarise_metric(metric, measured(*values, metric=metric))
+    assert (result.n, result.mean, result.worst) == (len(values), mean, worst)
+    assert (result.worst_seed, result.passed) == (seed, passed)
 
 
 def test_a_fall_is_never_a_pass_however_good_the_other_seeds() -> None:
@@ -65,16 +72,6 @@ def test_a_nan_is_a_failure() -> None:
     result = summarise_metric(SPEED, measured(2.0, math.nan))
     assert result.passed is False
     assert (result.mean, result.worst_seed, set(result.failures)) == (2.0, 1, {1})
-
-
-def test_a_metric_without_any_seed_does_not_pass() -> None:
-    assert summarise_metric(SPEED, {}).passed is False
-
-
-def test_a_metric_without_a_threshold_is_not_judged() -> None:
-    result = summarise_metric(NOTE, measured(5.0, metric=NOTE))
-    assert result.passed is None
-    assert summarise([fake()], {"fake": {0: fake().run(0)}}).ok
 
 
 # --- report -------------------------------------------------------------------------------------

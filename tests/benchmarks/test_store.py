@@ -65,22 +65,16 @@ def test_an_interrupted_run_goes_on_with_what_is_left(
     assert [path.name for path in results_folder.rglob("*.sqlite")] == ["fake.sqlite"]
 
 
-def test_more_seeds_than_before_only_add_to_it(only: Only) -> None:
+@pytest.mark.parametrize(("words", "seeds"), [(("5", "--resume"), [2, 3, 4]), (("2",), [0, 1])])
+def test_more_seeds_only_add_to_what_is_there_and_without_resume_all_is_measured_again(
+    only: Only, words: tuple[str, ...], seeds: list[int]
+) -> None:
     later = Interrupted(99)
     only(fake())
     main(["behaviour", "--seeds", "2"])
     only(fake(later))
-    assert main(["behaviour", "--seeds", "5", "--resume"]) == ExitCode.OK
-    assert later.seeds == [2, 3, 4]
-
-
-def test_without_resume_everything_is_measured_again(only: Only) -> None:
-    again = Interrupted(99)
-    only(fake())
-    main(["behaviour", "--seeds", "2"])
-    only(fake(again))
-    main(["behaviour", "--seeds", "2"])
-    assert again.seeds == [0, 1]
+    assert main(["behaviour", "--seeds", *words]) == ExitCode.OK
+    assert later.seeds == seeds
 
 
 def test_trials_come_back_to_the_last_bit(folder: Path) -> None:
