@@ -32,8 +32,6 @@ FASTER = {4: 3.5, 3: 3.5, 2: 3.0}
 be."""
 PLACO_TIME = 43.0
 """Time [us] of PlaCo's tick on two feet on the machine for which bars in us are meant."""
-READABLE = {"condensed": ("condensed", "daqp"), "full": ("full", "daqp")}
-"""Back end and solver of the readable forms."""
 
 
 def _rows(feet: int) -> tuple[tuple[str, str, str], ...]:
@@ -44,7 +42,6 @@ def _rows(feet: int) -> tuple[tuple[str, str, str], ...]:
         (f"{feet}.ours_p99", "ours, 99 of 100", "us"),
         (f"{feet}.placo_p99", "bare PlaCo, 99 of 100", "us"),
         (f"{feet}.tail", "99 of 100: ours by PlaCo's", "<= 1"),
-        *((f"{feet}.{form}", f"readable: {form}", "us") for form in READABLE),
     )
 
 
@@ -116,12 +113,6 @@ def measure_solves(trial: Trial, found: TrialResult) -> None:
             values |= {f"{feet}.{name}": median[name], f"{feet}.{name}_p99": p99[name]}
         values[f"{feet}.faster"] = median["placo"] / median["ours"]
         values[f"{feet}.tail"] = p99["ours"] / p99["placo"]
-        for name, (backend, solver) in READABLE.items():
-            form = WholeBodyController(model, backend, replace(config, solver=solver))
-            spent = interleaved(
-                ticks, {name: lambda tick, asked, form=form: form.solve(tick.snapshot, asked)}
-            )
-            values[f"{feet}.{name}"] = float(np.median(spent[name]))
 
 
 def interleaved(

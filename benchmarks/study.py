@@ -204,17 +204,10 @@ def tasks_of(studies: Sequence[Study], seeds: int) -> list[Task]:
 
 
 def run_tasks(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[Study, int, TrialResult]]:
-    """Study, seed and result of trials as they end, in the workers of a sweep.
+    """Study, seed and result of trials as they end, in the workers of a sweep, ``jobs`` at a time.
 
-    A process that dies costs no other trial its result.
-
-    Args:
-        tasks: what to measure.
-        jobs: processes at a time, from the main thread; 0 runs everything in this process.
+    A process that dies costs no other trial its result. To be called from the main thread.
     """
-    if not jobs:
-        yield from ((study, seed, study.run(seed)) for study, seed in tasks)
-        return
     for ended in LocalEngine(jobs).run(_run_task, tasks):
         failure = ended.failure
         if failure is not None and not failure.has_died:

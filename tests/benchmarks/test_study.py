@@ -22,7 +22,9 @@ from tests.benchmarks.support import (
 
 def results_of(*scenarios: Study, seeds: int, jobs: int = 0) -> Results:
     results: Results = {scenario.name: {} for scenario in scenarios}
-    for scenario, seed, measurement in run_tasks(tasks_of(scenarios, seeds), jobs):
+    tasks = tasks_of(scenarios, seeds)
+    here = ((study, seed, study.run(seed)) for study, seed in tasks)
+    for scenario, seed, measurement in run_tasks(tasks, jobs) if jobs else here:
         assert seed not in results[scenario.name]
         results[scenario.name][seed] = measurement
     return results
