@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from controller.bridges.ros2.names import ODOM, topic
+from controller.bridges.ros2 import ODOM, topic
 from go2_wbc.errors import BridgeError
 from go2_wbc.robot.state import RobotState
 from tests.controller.bridges.processes import wait_until

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
-from controller.bridges.ros2.names import (
+from controller.bridges.ros2 import (
     BEHAVIOR_SERVICE,
     CMD_VEL,
     COMMAND_PERIOD,

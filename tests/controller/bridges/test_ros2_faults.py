@@ -20,12 +20,7 @@ import pytest
 from tests.controller.bridges.processes import Process, wait_until
 from tests.controller.bridges.ros2_graph import needs_ros2
 from tests.controller.bridges.ros2_probe import WatchingProbe
-from tests.controller.bridges.ros2_processes import (
-    ANSWER,
-    DISCOVERY,
-    quiet_client,
-    serving,
-)
+from tests.controller.bridges.ros2_processes import ANSWER, DISCOVERY, quiet_client, serving
 
 if TYPE_CHECKING:
     from controller.bridges.ros2 import GO2ControllerNode

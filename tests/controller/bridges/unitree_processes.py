@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from jaxtyping import Shaped
 
-from controller.bridges.unitree.codec import decode_message
-from controller.bridges.unitree.layout import SPORT_STATE
+from controller.bridges.unitree.messages import SPORT_STATE, decode_message
 from controller.bridges.unitree.sport_api import (
     SPORT_SERVICE,
     Api,

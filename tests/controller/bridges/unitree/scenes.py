@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from controller.bridges.unitree.codec import encode_message
 from controller.bridges.unitree.low_level import low_cmd_message
+from controller.bridges.unitree.messages import encode_message
 from controller.bridges.unitree.sport_api import SWITCHER_SERVICE, Api, Code, SwitcherApi
 from go2_wbc.robot.state import JointCommand
 from tests.controller.bridges.processes import Process, wait_until
