@@ -149,8 +149,10 @@ def measure_stops(trial: Trial, found: TrialResult) -> None:
     height = (GREATEST_HEIGHT, LEAST_HEIGHT)[trial.seed % 2]
     config = Config(locomotion=LocomotionConfig(height=height))
     robot = TrialRobot(replace(trial, seed=seed, has_nominal_friction=True), config)
-    _measure(robot, partial(pushed, impulse=IMPULSE_AT_STOPS, speed=0.8), seed, found)
-    distance = calf_distance(robot.truth.recording())
+    course = partial(pushed, impulse=IMPULSE_AT_STOPS, speed=0.8)
+    with robot:
+        watch(robot, course(robot, np.random.default_rng(seed)), found)
+        distance = calf_distance(robot.truth.recording())
     found.values["near"] = 100.0 * float((distance < AT_STOP).mean())
 
 
