@@ -11,5 +11,4 @@ the simulator says (``GroundTruth``), never the controller's own verdict.
     robots          robots on trial, what pushes them, and what is true of them
     validation_set  motions by which the feasibility check is judged, and what physics makes of them
     bridges         ROS 2 and Unitree's protocol between processes
-    studies         what is behind single pages of the documentation
 """

@@ -17,18 +17,13 @@ COMMANDS: tuple[Command, ...] = (
     Command("locomotion", "benchmarks.locomotion", "gaits at their speeds"),
     Command("envelopes", "benchmarks.envelopes", "the greatest speed of each gait, and store it"),
     Command("balance", "benchmarks.balance", "pushes, drops, gait changes; falls noticed"),
-    Command("dynamics", "benchmarks.dynamics", "solving dynamic motions, and what comes of it"),
     Command("dance", "benchmarks.dance", "dances against the true beats of their songs"),
     Command("golden", "benchmarks.golden", "is every tick what it was, to the last bit?"),
     Command("plain", "benchmarks.plain", "does compiled code do what its own Python does?"),
     Command("speed", "benchmarks.speed", "processor time of the QP and of a control tick"),
     Command("dynamic_motions", "benchmarks.dynamic_motions", "jumps, hops and rears in physics"),
-    Command(
-        "jump_limits", "benchmarks.studies.jump_limits", "the greatest jumps, what forbids more"
-    ),
     Command("probability", "benchmarks.probability", "is the stated chance the one that it has?"),
     Command("false_negatives", "benchmarks.false_negatives", "do motions that passed fall?"),
-    Command("sweeps", "benchmarks.sweeping", "a second worker, memory, the time of a certificate"),
     Command("nearest", "benchmarks.nearest", "the nearest to motions that the check refuses"),
     Command("solve", "benchmarks.solved_plans", "solve the library's dynamic plans, to ship them"),
     Command("gallery", "benchmarks.gallery", "play the library's motions, write their pictures"),
@@ -40,6 +35,12 @@ ALIASES = {
     "trust": "false_negatives",
 }
 """Former names of commands."""
+GONE = {
+    "jump_limits": "docs/explanation/dynamics.md has its results, commit 55f699b its program",
+    "dynamics": "`nearest` measures what planning takes, commit 55f699b has the program",
+    "sweeps": "commit 55f699b has the program",
+}
+"""What is no command any more, and where it is."""
 EXAMPLES = """
 python -m benchmarks --list                     these benchmarks
 python -m benchmarks behaviour --list           the metrics of one, and their thresholds
@@ -57,6 +58,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     if arguments[:1] and arguments[0] in ALIASES:
         arguments[0] = ALIASES[arguments[0]]
+    if arguments[:1] and arguments[0] in GONE:
+        print(f"{arguments[0]} is gone: {GONE[arguments[0]]}", file=sys.stderr)
+        return ExitCode.USAGE
     if arguments == ["--list"]:
         for command in COMMANDS:
             print(f"{command.name:<18}{command.summary}")

@@ -18,17 +18,16 @@ from 30000 to 63999; those judged begin at ``FIRST_SEED``.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from benchmarks import disturbed
 from benchmarks.command import Benchmark
-from benchmarks.locomotion import MASS_RANGE
 from benchmarks.qp_infeasibility import commanded
-from benchmarks.robots import PUSH_TIME, heading_force, plant_of
-from benchmarks.study import Direction, Measurement, Metric, Study, sensed
+from benchmarks.robots import PUSH_TIME, UNTOLD, heading_force, plant_of
+from benchmarks.study import Study, TrialResult
 from controller.checks import is_standing
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.contacts import GAITS
@@ -39,15 +38,12 @@ from go2_wbc.robot.model import RobotModel
 
 FIRST_SEED = 64000
 """Seed of the first trial that is judged, but of disturbed runs, which have their own."""
-ASIDE, AHEAD = 36.0, 45.0
-"""Impulses [N s] on the standing robot."""
+ASIDE, AHEAD = 36.0, 45.0  # Impulses [N s] on the standing robot
 DIRECTIONS, PHASES = 8, 16
 STANDING_LIMIT = 3.0
 """Time [s] after a push in which the robot must stand again."""
-LOOK = 0.05
-"""Time [s] between two looks at the robot."""
-CALM = 0.2
-"""Time [s] for which it must stand."""
+LOOK = 0.05  # Time [s] between two looks at the robot
+CALM = 0.2  # Time [s] for which it must stand
 TROT_PUSHES = {"lateral": (math.pi / 2, 26.0), "forward": (0.0, 50.0), "backward": (math.pi, 42.0)}
 """Direction [rad] and impulse [N s]."""
 TROT_SPEED, SPEED_TOLERANCE, TROT_TIME = 0.5, 0.15, 2.0
@@ -60,8 +56,7 @@ DROP_TIME = 1.0
 GENTLE = VelocityEnvelope(forward=1.2, backward=1.2, lateral=0.5, turning=1.5)
 """Of the trot's changes; those of the other gaits are in proportion."""
 CHANGES = 10
-COMMANDS = 80
-"""Random velocities of a run, two minutes of them."""
+COMMANDS = 80  # Random velocities of a run, two minutes of them
 
 
 def impulse_at(angle: float) -> float:
@@ -69,10 +64,10 @@ def impulse_at(angle: float) -> float:
     return 1.0 / math.hypot(math.cos(angle) / AHEAD, math.sin(angle) / ASIDE)
 
 
-def measure_standing(trial: Trial, direction: int) -> Measurement:
+def measure_standing(trial: Trial, found: TrialResult, direction: int) -> None:
     """Push the standing robot in one direction."""
-    name, angle = f"stand-{45 * direction}", 2.0 * math.pi * direction / DIRECTIONS
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE)) as robot:
+    angle = 2.0 * math.pi * direction / DIRECTIONS
+    with TrialRobot(plant_of(trial, FIRST_SEED, UNTOLD)) as robot:
         robot.require(robot.go2.stand())
         start, since = robot.plant.time, math.inf
         try:
@@ -82,19 +77,19 @@ def measure_standing(trial: Trial, direction: int) -> Measurement:
                 stands = is_standing(RobotModel().snapshot(robot.plant.truth()))
                 since = min(since, robot.plant.time) if stands else math.inf
         except TrialFailed as failed:
-            return Measurement({name: 0.0}, notes={name: str(failed)})
-    return Measurement({name: float(since <= start + STANDING_LIMIT - CALM)})
+            since, found.notes[""] = math.inf, str(failed)
+    found.values[""] = float(since <= start + STANDING_LIMIT - CALM)
 
 
-def measure_trotting(trial: Trial, push: str) -> Measurement:
+def measure_trotting(trial: Trial, found: TrialResult, push: str) -> None:
     """Push the trotting robot at every phase; the share of phases that it survives."""
     angle, impulse = TROT_PUSHES[push]
     survived = 0
     for phase in range(PHASES):
         side = 1.0 if phase % 2 or push != "lateral" else -1.0
-        with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE)) as robot:
+        with TrialRobot(plant_of(trial, FIRST_SEED, UNTOLD)) as robot:
             survived += trots_on(robot, phase, heading_force(side * angle, impulse))
-    return Measurement({f"trot-{push}": survived / PHASES})
+    found.values[""] = survived / PHASES
 
 
 def trots_on(robot: TrialRobot, phase: int, force: np.ndarray) -> bool:
@@ -117,7 +112,7 @@ def trots_on(robot: TrialRobot, phase: int, force: np.ndarray) -> bool:
 def dropped(seed: int, sensors: str = "ideal") -> MujocoPlant:
     """A robot in the air, in any attitude, with any joint angles."""
     rng, model = np.random.default_rng(seed), RobotModel()
-    friction, mass = float(rng.uniform(*DROP_FRICTION)), float(rng.uniform(*MASS_RANGE))
+    friction, mass = float(rng.uniform(*DROP_FRICTION)), float(rng.uniform(*UNTOLD))
     plant = MujocoPlant(friction=friction, mass_scale=mass, seed=seed, sensors=sensors)
     q = np.concatenate(
         [[0.0, 0.0, 1.0], rng.normal(size=4), rng.uniform(model.q_lower, model.q_upper)]
@@ -129,21 +124,22 @@ def dropped(seed: int, sensors: str = "ideal") -> MujocoPlant:
     return plant
 
 
-def measure_recovery(trial: Trial) -> Measurement:
+def measure_recovery(trial: Trial, found: TrialResult) -> None:
     """Drop the limp robot and let it get up."""
     with TrialRobot(dropped(FIRST_SEED + trial.seed, trial.sensors)) as robot:
         robot.go2.wait(DROP_TIME)
         said = robot.go2.recover()
         is_up = said and robot.truth.fall() is None
         stands = is_up and is_standing(RobotModel().snapshot(robot.plant.truth()))
-        notes = {} if stands else {"recover": robot.go2.last_outcome.reason}
-    return Measurement({"recover": float(stands)}, notes=notes)
+        found.values[""] = float(stands)
+        if not stands:
+            found.notes[""] = robot.go2.last_outcome.reason
 
 
-def measure_gaits(trial: Trial) -> Measurement:
+def measure_gaits(trial: Trial, found: TrialResult) -> None:
     """Change the gait, or stop, again and again."""
     rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE)) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, UNTOLD)) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         try:
@@ -151,8 +147,8 @@ def measure_gaits(trial: Trial) -> Measurement:
                 _change(robot, rng)
                 done += 1
         except TrialFailed as failed:
-            return Measurement({"gaits": done / CHANGES}, notes={"gaits": str(failed)})
-    return Measurement({"gaits": 1.0})
+            found.notes[""] = str(failed)
+    found.values[""] = done / CHANGES
 
 
 def _change(robot: TrialRobot, rng: np.random.Generator) -> None:
@@ -169,73 +165,61 @@ def _change(robot: TrialRobot, rng: np.random.Generator) -> None:
     robot.wait(float(rng.uniform(0.3, 1.5)))
 
 
-def measure_commands(trial: Trial) -> Measurement:
+def measure_commands(trial: Trial, found: TrialResult) -> None:
     """Follow random velocities; ticks in which the QP had no answer are counted."""
     rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE)) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, UNTOLD)) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
-        counts, why = robot.go2.telemetry, ""
         try:
             for seconds in commanded(robot, rng, COMMANDS):
                 robot.wait(seconds)
                 robot.truth.clear()  # two minutes' recording would be two gigabytes
                 done += 1
         except TrialFailed as failed:
-            why = str(failed)
-        failures = float(counts.qp_failures)
-    values = {"commands": done / COMMANDS, "commands.failures": failures}
-    return Measurement(values, notes={"commands": why} if why else {})
-
-
-def _study(
-    name: str,
-    item: str,
-    quantity: str,
-    measure: Callable[[Trial], Measurement],
-    *more: Metric,
-    least: float = 1.0,
-    times: int = 1,
-) -> Study:
-    """A row whose value is a share, and what is told besides."""
-    share = Metric(name, item, quantity, "", least, Direction.AT_LEAST)
-    return Study(name, (share, *more), measure, times, "truth")
+            found.notes[""] = str(failed)
+        failures = float(robot.go2.telemetry.qp_failures)
+    found.values = {"": done / COMMANDS, "failures": failures}
 
 
 _STANDING = f"standing, push 0.1 s, {ASIDE:g} N s aside, {AHEAD:g} ahead"
 _TROT = f"trot {TROT_SPEED:g} m/s, push 0.1 s, 16 phases"
-_COMMANDS = "random commands, 120 s"
+_ALL = ">= 1"
 ON_TRUTH = (
     *(
-        _study(
+        Study(
             f"stand-{45 * k}",
-            _STANDING,
-            f"survived at {45 * k} deg",
+            {_STANDING: [("", f"survived at {45 * k} deg", _ALL)]},
             partial(measure_standing, direction=k),
         )
         for k in range(DIRECTIONS)
     ),
     *(
-        _study(
+        Study(
             f"trot-{push}",
-            _TROT,
-            f"{push} {impulse:g} N s survived",
+            {_TROT: [("", f"{push} {impulse:g} N s survived", _ALL)]},
             partial(measure_trotting, push=push),
         )
         for push, (_, impulse) in TROT_PUSHES.items()
     ),
-    _study("recover", "drops", "stand again", measure_recovery, least=0.98, times=10),
-    _study("gaits", "ten changes of gait and stops", "done", measure_gaits),
-    _study(
+    Study("recover", {"drops": [("", "stand again", ">= 0.98")]}, measure_recovery, seed_factor=10),
+    Study("gaits", {"ten changes of gait and stops": [("", "done", _ALL)]}, measure_gaits),
+    Study(
         "commands",
-        _COMMANDS,
-        "followed without a fall",
+        {
+            "random commands, 120 s": (
+                ("", "followed without a fall", _ALL),
+                ("failures", "ticks without an answer", "<= 0"),
+            )
+        },
         measure_commands,
-        Metric("commands.failures", _COMMANDS, "ticks without an answer", "", 0.0),
     ),
     disturbed.STUDY,
 )
-STUDIES = (*ON_TRUTH, *(sensed(study, "sensors") for study in ON_TRUTH))
+STUDIES = (
+    *(replace(study, group="truth") for study in ON_TRUTH),
+    *(study.sensed("sensors") for study in ON_TRUTH),
+)
 """In the order of the report."""
 
 
@@ -243,10 +227,7 @@ BENCHMARK = Benchmark(
     "balance",
     "Pushes, drops, changes of gait, and whether a fall is noticed.",
     STUDIES,
-    examples=(
-        "--rows sensors",
-        "--rows recover sensed-recover",
-    ),
+    examples=("--rows sensors", "--rows recover sensed-recover"),
     more_seeds="; times 10 for drops, 50 for disturbed runs",
 )
 register, run = BENCHMARK.register, BENCHMARK.run

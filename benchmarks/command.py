@@ -6,32 +6,19 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 from benchmarks import store
 from benchmarks.report import render, summarise, threshold_text
-from benchmarks.store import Store
-from benchmarks.study import (
-    IDEAL,
-    IMU,
-    Measurement,
-    Results,
-    Study,
-    Task,
-    chosen_studies,
-    run_tasks,
-    tasks_of,
-)
+from benchmarks.study import IDEAL, IMU, Results, Study, Task, chosen_studies, run_tasks, tasks_of
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
 from controller.cli.progress import ProgressLine
 from controller.cli.sweep import tell
 from controller.sweeps.rows import Row
 from controller.sweeps.run import SweepResult, sweep
-from controller.sweeps.trials import Trial
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 
@@ -51,7 +38,6 @@ class Benchmark:
         more_seeds: what the help says of the number of seeds, besides the default.
         sensors: whether they can be chosen.
         runs: how often a study that draws nothing is run, one after the other; 0 for seeds.
-        jobs: processes of such runs; 0 for none but this one.
     """
 
     name: str
@@ -62,7 +48,6 @@ class Benchmark:
     more_seeds: str = ""
     sensors: bool = False
     runs: int = 0
-    jobs: int = 1
 
     def register(self, subparsers: Subparsers) -> None:
         """Add the command and its options."""
@@ -81,7 +66,7 @@ class Benchmark:
             text = f"{', '.join(names)}; default: all"
             parser.add_argument("names", metavar="NAME", nargs="*", help=text)
             add_options(parser, "runs", "list", *RESULTS)
-            parser.set_defaults(runs=self.runs, jobs=self.jobs)
+            parser.set_defaults(runs=self.runs, jobs=1)
         else:
             sensors = ("sensors",) if self.sensors else ()
             add_options(parser, *sensors, *SEEDED, more_seeds=self.more_seeds)
@@ -92,8 +77,8 @@ class Benchmark:
             studies = chosen_studies(self.studies, args.names)
             return run_and_report(args, studies, tasks_of(studies, args.runs))
         sensors = getattr(args, "sensors", IDEAL)
-        studies = [study for study in self.studies if study.has_sensors or sensors == IDEAL]
-        studies = [on_sensors(study, sensors) for study in chosen_studies(studies, args.rows)]
+        studies = [study for study in self.studies if study.sensors or sensors == IDEAL]
+        studies = [study.on(sensors) for study in chosen_studies(studies, args.rows)]
         return run_and_report(args, studies, tasks_of(studies, seeds_of(args)))
 
 
@@ -162,18 +147,6 @@ def seeds_of(args: argparse.Namespace) -> int:
 # --- runs -----------------------------------------------------------------------------------------
 
 
-def on_sensors(study: Study, sensors: str) -> Study:
-    """The study with a plant of these ``sensors``; kept on disk under a name of its own."""
-    if sensors == IDEAL:
-        return study
-    measure = partial(_measure_on, measure=study.measure, sensors=sensors)
-    return replace(study, name=f"{study.name}, {sensors}", measure=measure)
-
-
-def _measure_on(trial: Trial, measure: Callable[[Trial], Measurement], sensors: str) -> Measurement:
-    return measure(replace(trial, sensors=sensors))
-
-
 def run_and_report(
     args: argparse.Namespace, studies: Sequence[Study], tasks: Sequence[Task]
 ) -> int:
@@ -191,21 +164,21 @@ def measure_all(args: argparse.Namespace, tasks: Sequence[Task]) -> Results:
     studies = {study.name: study for study, _ in tasks}
     results: Results = {name: {} for name in studies}
     folder = store.FOLDER / args.command
-    with Store(folder, studies.values(), resume=args.resume) as kept, ProgressLine() as line:
+    with store.opened(folder, studies.values(), resume=args.resume) as kept, ProgressLine() as line:
         if kept.finished:
             print(f"{len(kept.finished)} finished trials are taken from {folder}", file=sys.stderr)
         left = [(s, seed) for s, seed in tasks if (s.name, seed) not in kept.finished]
         for study, seed in tasks:
-            if measurement := kept.finished.get((study.name, seed)):
-                results[study.name][seed] = measurement
+            if result := kept.finished.get((study.name, seed)):
+                results[study.name][seed] = result
         line.update(0.0, "starting")
-        for study, seed, measurement in run_tasks(left, args.jobs):
-            kept.add(study, seed, measurement)
-            results[study.name][seed] = measurement
+        for study, seed, result in run_tasks(left, args.jobs):
+            kept.add(study, seed, result)
+            results[study.name][seed] = result
             done = sum(map(len, results.values()))
             place = f"{done}/{len(tasks)} {study.name}, seed {seed}"
-            failures = [f"{metric}: {why}" for metric, why in measurement.failures.items()]
-            line.done(f"{place}: {measurement.reason or '; '.join(failures) or 'ok'}")
+            failures = [f"{metric}: {why}" for metric, why in result.failures.items()]
+            line.done(f"{place}: {result.reason or '; '.join(failures) or 'ok'}")
             line.update(done / len(tasks), place)
     return results
 
@@ -219,11 +192,7 @@ def run_sweep(
 ) -> SweepResult:
     """Run those of ``n`` seeds whose rows are not kept yet, and tell of the progress.
 
-    Args:
-        args: with the options of ``add_sweep``.
-        trial: a function ``(seed) -> row`` of a module.
-        n: how many seeds.
-        is_enough: see ``controller.sweep``.
+    ``args`` has the options of ``add_sweep``; the rest is as in ``controller.sweep``.
 
     Raises:
         ConfigError: if the folder of the rows cannot be made, or they depend on something else.
@@ -234,15 +203,8 @@ def run_sweep(
     except OSError as error:
         raise ConfigError(f"cannot make the folder of {rows}: {error.strerror}") from error
     with ProgressLine() as line:
-        return sweep(
-            trial,
-            n,
-            workers=args.jobs,
-            out=rows,
-            keep_going=True,
-            is_enough=is_enough,
-            on_progress=lambda progress: tell(line, progress),
-        )
+        options = {"workers": args.jobs, "out": rows, "keep_going": True, "is_enough": is_enough}
+        return sweep(trial, n, **options, on_progress=lambda progress: tell(line, progress))
 
 
 # --- output ---------------------------------------------------------------------------------------

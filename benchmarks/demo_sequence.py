@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.high_five import highest_window
 from benchmarks.robots import standing_failure, way_between
-from benchmarks.study import Direction, Measurement, Metric, Study
+from benchmarks.study import Study, TrialResult
 from controller.demo.run import DemoProgress, run_demo
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.legs import LEGS, Leg
@@ -21,28 +21,17 @@ SIT_PITCH = math.radians(-25.0)
 """Pitch of the trunk of a sitting robot: at least this much nose up."""
 SIT_REAR_HEIGHT = 0.16
 """Height [m] below which the rear end of the trunk is down; it is at 0.29 m when standing."""
-REAR_END = -0.1934
-"""m; the rear hips in the base frame, by the URDF."""
-FORWARD_WAY = (0.30, 0.44)
-"""Way [m] of two seconds at 0.2 m/s, from rest."""
+REAR_END = -0.1934  # m; the rear hips in the base frame, by the URDF
+FORWARD_WAY = (0.30, 0.44)  # Way [m] of two seconds at 0.2 m/s, from rest
 FORWARD_ASIDE = 0.05
-STOP_SPEED = 0.05
-"""m/s"""
+STOP_SPEED = 0.05  # m/s
 TURN = (math.pi / 2, math.radians(2.0))
 PAW_HEIGHT, PAW_TIME = 0.60, 1.9
 """Height [m] that the paw keeps, and for how long [s]: the hold without its edges."""
-PAW_SUPPORT = 5.0
-"""N on every other foot meanwhile."""
-
-_ITEM = "whole demo sequence"
-METRICS = (
-    Metric("demo.done", _ITEM, "share of seeds done", "", 1.0, Direction.AT_LEAST),
-    Metric("demo.untrue", _ITEM, "True that does not hold", "", 0.0),
-    Metric("demo.pace", "whole run headless", "real-time factor, CPU", "", 2.5, Direction.AT_LEAST),
-)
+PAW_SUPPORT = 5.0  # N on every other foot meanwhile
 
 
-def measure(trial: Trial) -> Measurement:
+def measure(trial: Trial, found: TrialResult) -> None:
     """Run the demo and check every step that it calls done against the simulator.
 
     - share of seeds done: 1 for a trial in which every step was done, 0 for any other;
@@ -57,14 +46,14 @@ def measure(trial: Trial) -> Measurement:
         report = run_demo(robot.go2, check)
         robot_time, recording_time = robot.plant.time, robot.truth.cpu_time
     cpu_time = time.process_time() - cpu_start - recording_time
-    values = {
-        "demo.done": float(report.ok),
-        "demo.untrue": float(len(check.untrue)),
-        "demo.pace": robot_time / cpu_time,
+    found.values = {
+        "done": float(report.ok),
+        "untrue": float(len(check.untrue)),
+        "pace": robot_time / cpu_time,
     }
     undone = [f"{step.name}: {step.reason}" for step in report.steps if not step.ok]
-    failures = {"demo.done": "; ".join(undone), "demo.untrue": "; ".join(check.untrue)}
-    return Measurement(values, {name: why for name, why in failures.items() if why})
+    failures = {"done": "; ".join(undone), "untrue": "; ".join(check.untrue)}
+    found.failures = {name: why for name, why in failures.items() if why}
 
 
 class StepCheck:
@@ -76,21 +65,19 @@ class StepCheck:
 
     def __init__(self, robot: TrialRobot) -> None:
         """Check ``robot``'s demo."""
-        self._robot = robot
-        self._before = robot.plant.truth()
+        self._robot, self._before = robot, robot.plant.truth()
         self.untrue: list[str] = []
 
     def __call__(self, progress: DemoProgress) -> None:
         """Take note of a step's begin, or check its end."""
-        if progress.result is None:
+        if (result := progress.result) is None:
             self._before = self._robot.plant.truth()
             self._robot.truth.clear()
-        elif progress.result.ok:
-            name = progress.result.name
-            failure = self._robot.truth.fall() if "sit" not in name else None
-            failure = failure or CRITERIA[name](self._robot, self._before)
+        elif result.ok:
+            failure = self._robot.truth.fall() if "sit" not in result.name else None
+            failure = failure or CRITERIA[result.name](self._robot, self._before)
             if failure is not None:
-                self.untrue.append(f"{name}: {failure}")
+                self.untrue.append(f"{result.name}: {failure}")
 
 
 def _stand(robot: TrialRobot, _before: RobotState) -> str | None:
@@ -154,4 +141,11 @@ CRITERIA: dict[str, Callable[[TrialRobot, RobotState], str | None]] = {
 """What is missing for a step to be true, by the step's name; every step must have one."""
 
 
-STUDY = Study("sequence", METRICS, measure, seed_factor=5)
+TABLE = {
+    "whole demo sequence": (
+        ("done", "share of seeds done", ">= 1"),
+        ("untrue", "True that does not hold", "<= 0"),
+    ),
+    "whole run headless": (("pace", "real-time factor, CPU", ">= 2.5"),),
+}
+STUDY = Study("sequence", TABLE, measure, "demo", seed_factor=5)

@@ -17,9 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.locomotion import MASS_RANGE
-from benchmarks.robots import PUSH_TIME, heading_force, plant_of
-from benchmarks.study import Measurement, Metric, Study
+from benchmarks.robots import PUSH_TIME, UNTOLD, heading_force, plant_of
+from benchmarks.study import Study, TrialResult
 from controller.modes import Mode
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.contacts import GAITS
@@ -34,21 +33,18 @@ CALLED = ("stand", "sit", "lie_down", "high_five", "walk", "walk", "play", "turn
 MOTIONS = ("bow", "wave", "push_ups", "march", "rear_up", "jump_up", "bunny_hops")
 RECOVERIES = 3
 """How often in a row the robot may try to get up under pushes."""
-HARDEST = 90.0
-"""Greatest impulse [N s] of a push on the level."""
+HARDEST = 90.0  # Greatest impulse [N s] of a push on the level
 LIFTING = (-0.5, 1.0)
 """Range of the upward impulse of the others, over their greatest one on the level."""
 PUSHED = ("base", "FL_hip", "FR_hip", "RL_hip", "RR_hip")
-PAUSE = (1.0, 6.0)
-"""Range of the time [s] between two pushes."""
+PAUSE = (1.0, 6.0)  # Range of the time [s] between two pushes
 RISEN = 0.2
 """Height [m] of the base over the lowest foot from which on a trunk has left the ground."""
 LEAST_FEET, STOOD = 2, 0.2
 """Feet on the ground and time [s] by which it has not just been lifted by a push."""
 STUMBLE = 0.05
 """Time [s] for which a trunk may touch the ground without having fallen."""
-NOTICED = 0.2
-"""Time [s] in which a fall must be noticed."""
+NOTICED = 0.2  # Time [s] in which a fall must be noticed
 DOWN = (Mode.FALLEN, Mode.DAMPED)
 
 
@@ -110,14 +106,15 @@ class Watch:
         mode, now = self._robot.go2.mode, self._robot.plant.time
         if now >= self._next:
             self._push(now)
-        if mode in DOWN:
-            has_fallen = mode is Mode.FALLEN or math.isfinite(self._fell)
-            if has_fallen and self._said not in DOWN:
-                self._note(now)
+        if mode not in DOWN:
+            self._judge(mode, now)
+        else:
+            if (mode is Mode.FALLEN or math.isfinite(self._fell)) and self._said not in DOWN:
+                fell = min(self._fell, now)
+                before = self._said if math.isinf(self._fell) else self._fell_as
+                self.falls.append(Fall(fell, now - fell, before, self.call))
             self._touches_since = self._fell = self._stands_since = math.inf
             self._has_risen = False
-        else:
-            self._judge(mode, now)
         self._said = mode
 
     def _push(self, now: float) -> None:
@@ -129,11 +126,6 @@ class Watch:
             where = str(rng.choice(PUSHED))
         plant.push(force, PUSH_TIME, where)
         self._next = now + float(rng.uniform(*PAUSE))
-
-    def _note(self, now: float) -> None:
-        fell = min(self._fell, now)
-        as_ = self._said if math.isinf(self._fell) else self._fell_as
-        self.falls.append(Fall(fell, now - fell, as_, self.call))
 
     def _judge(self, mode: Mode, now: float) -> None:
         plant = self._robot.plant
@@ -151,10 +143,10 @@ class Watch:
             self._fell, self._fell_as = (self._touches_since if lies else now), mode
 
 
-def measure_disturbed(trial: Trial) -> Measurement:
+def measure_disturbed(trial: Trial, found: TrialResult) -> None:
     """Call at random, push at random, and let the robot recover from every fall."""
     rng = np.random.default_rng(FIRST_SEED + trial.seed)
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE)) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, UNTOLD)) as robot:
         watch = Watch(robot, rng)
         robot.truth.on_tick = watch.look
         for _ in range(CALLS):
@@ -168,11 +160,10 @@ def measure_disturbed(trial: Trial) -> Measurement:
             robot.go2.wait(2.0 * NOTICED)
         falls, longest = watch.all_falls, watch.delay  # what comes now is the end
     late = [str(fall) for fall in falls if not fall.delay <= NOTICED]
-    return Measurement(
-        {"disturbed.delay": longest, "disturbed.falls": float(len(falls))},
-        {"disturbed.delay": "; ".join(late)} if late else {},
-        notes={"disturbed.falls": "; ".join(map(str, falls))},
-    )
+    found.values = {"delay": longest, "falls": float(len(falls))}
+    found.notes["falls"] = "; ".join(map(str, falls))
+    if late:
+        found.failures["delay"] = "; ".join(late)
 
 
 def _make(robot: TrialRobot, watch: Watch, what: str, rng: np.random.Generator) -> None:
@@ -199,9 +190,8 @@ def _make(robot: TrialRobot, watch: Watch, what: str, rng: np.random.Generator) 
         return
 
 
-_ITEM = "random calls and pushes"
-METRICS = (
-    Metric("disturbed.delay", _ITEM, "longest delay of notice", "s", NOTICED),
-    Metric("disturbed.falls", _ITEM, "falls", "", None),
+ROWS = (
+    ("delay", "longest delay of notice", f"<= {NOTICED:g} s"),
+    ("falls", "falls", ""),
 )
-STUDY = Study("disturbed", METRICS, measure_disturbed, 50, "truth")
+STUDY = Study("disturbed", {"random calls and pushes": ROWS}, measure_disturbed, seed_factor=50)

@@ -17,17 +17,15 @@ from jaxtyping import Bool, Float
 
 from benchmarks.command import Benchmark
 from benchmarks.robots import feet_frame, loads, plant_of
-from benchmarks.study import Direction, Measurement, Metric, Study
+from benchmarks.study import Rows, Study, TrialResult
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.legs import Leg
-from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline, deg
 
-FIRST_SEED = 6200
-"""Seed of the first trial that is judged."""
+FIRST_SEED = 6200  # Seed of the first trial that is judged
 AFTERWARDS = 1.0
 """Time [s] for which the robot must stand when the motion is over."""
 PRESSED = 15.0
@@ -100,64 +98,13 @@ def plan_of(name: str) -> tuple[CompiledPlan, bool]:
     return plan, FeasibilityChecker(model).check(plan).ok
 
 
-def measure(trial: Trial, name: str) -> Measurement:
+def measure(trial: Trial, found: TrialResult, name: str) -> None:
     """Play it, stand for a second, look what came of it."""
     plan, is_feasible = plan_of(name)
     if not is_feasible:
-        return Measurement({f"{name}.done": 0.0}, reason="the check refuses the plan")
-    model = RobotModel()
-    try:
-        played = play(plant_of(trial, FIRST_SEED), plan, model)
-        if played.objection:
-            raise TrialFailed(played.objection)
-    except TrialFailed as failed:
-        done = f"{name}.done"
-        return Measurement({done: 0.0}, {done: str(failed)}, str(failed))
-    return Measurement(_values(name, plan, played, model))
-
-
-@dataclass(frozen=True, slots=True)
-class Played:
-    """What came of a plan.
-
-    Attributes:
-        recorded: while it was played.
-        moved: way of the middle of the feet [m], along the heading at first.
-        turned: change of their heading [rad], in (-pi, pi].
-        objection: why the controller says that it was not done; empty if it was.
-    """
-
-    recorded: TruthRecording
-    moved: Float[np.ndarray, "3"]
-    turned: float
-    objection: str
-
-    @property
-    def height(self) -> float:
-        """Greatest height [m] of the lowest foot's centre above where it stood."""
-        lowest = self.recorded.p_world_feet[:, :, 2].min(axis=1)
-        return float(lowest.max() - lowest[0])
-
-    def values(self, name: str, plan: CompiledPlan, model: RobotModel) -> dict[str, float]:
-        """The metrics that every jump has, of the item ``name``."""
-        x, y, yaw = plan.end_pose
-        values = {
-            "done": 1.0,
-            "place": 1000.0 * math.hypot(self.moved[0] - x, self.moved[1] - y),
-            "yaw": abs(math.degrees(wrap_angle(self.turned - yaw))),
-            "asked": float(self.recorded.asked_shares(model).max()),
-            **loads(self.recorded),
-        }
-        return {f"{name}.{quantity}": value for quantity, value in values.items()}
-
-
-def play(plant: MujocoPlant, plan: CompiledPlan, model: RobotModel) -> Played:
-    """Stand, play the plan unchecked, stand for a second.
-
-    Raises:
-        TrialFailed: if the robot falls.
-    """
-    with TrialRobot(plant) as robot:
+        raise TrialFailed("the check refuses the plan")
+    model, item = RobotModel(), ITEMS[name]
+    with TrialRobot(plant_of(trial, FIRST_SEED)) as robot:
         robot.require(robot.go2.stand())
         before = feet_frame(robot)
         robot.truth.clear()
@@ -167,23 +114,25 @@ def play(plant: MujocoPlant, plan: CompiledPlan, model: RobotModel) -> Played:
             robot.wait(AFTERWARDS)
         except TrialFailed as failed:
             raise TrialFailed(objection or str(failed)) from None
+        if objection:
+            raise TrialFailed(objection)
         after = feet_frame(robot)
+    x, y, yaw = plan.end_pose
     moved = yaw_rotation(before.yaw).T @ (after.p_world - before.p_world)
-    return Played(recorded, moved, wrap_angle(after.yaw - before.yaw), objection)
-
-
-def _values(name: str, plan: CompiledPlan, played: Played, model: RobotModel) -> dict[str, float]:
-    values, recorded, item = played.values(name, plan, model), played.recorded, ITEMS[name]
+    found.values = {
+        "place": 1000.0 * math.hypot(moved[0] - x, moved[1] - y),
+        "yaw": abs(math.degrees(wrap_angle(after.yaw - before.yaw - yaw))),
+        "asked": float(recorded.asked_shares(model).max()),
+        **loads(recorded),
+    }
     if item.height is not None:
         heights = recorded.p_world_feet[:, :, 2].min(axis=1) - model.foot_radius
-        values[f"{name}.height"] = 1000.0 * abs(float(heights.max()) - item.height)
+        found.values["height"] = 1000.0 * abs(float(heights.max()) - item.height)
     if item.counts_beats:
-        values[f"{name}.beat"] = 1000.0 * _beat_error(recorded)
-    legs, _ = item.in_air
-    if legs:
-        off = np.all(recorded.foot_forces[:, list(legs)] < PRESSED, axis=1)
-        values[f"{name}.air"] = _longest(recorded.time, off)
-    return values
+        found.values["beat"] = 1000.0 * _beat_error(recorded)
+    if legs := list(item.in_air[0]):
+        off = np.all(recorded.foot_forces[:, legs] < PRESSED, axis=1)
+        found.values["air"] = _longest(recorded.time, off)
 
 
 def _longest(times: Float[np.ndarray, " n"], mask: Bool[np.ndarray, " n"]) -> float:
@@ -208,34 +157,25 @@ def _beat_error(recorded: TruthRecording) -> float:
     return max(off) if len(landings) == HOPS else 1.0
 
 
-def metrics_of(name: str, title: str, done: float) -> list[Metric]:
-    """The metrics that every jump has; ``done`` is the threshold of the trials that are done."""
-    return [
-        Metric(f"{name}.done", title, "done, stands 1 s later", "", done, Direction.AT_LEAST),
-        Metric(f"{name}.place", title, "lands off its place", "mm", 40.0),
-        Metric(f"{name}.yaw", title, "lands off its heading", "deg", 3.0),
-        Metric(f"{name}.torque", title, "peak torque / motors' line", "", 1.0),
-        Metric(f"{name}.asked", title, "asked for / motors' line", "", 1.0),
-        Metric(f"{name}.speed", title, "peak joint speed / limit", "", 1.0),
-        Metric(f"{name}.saturated", title, "saturated ticks", "%", 2.0),
-    ]
-
-
-def _metrics(name: str, item: Item) -> tuple[Metric, ...]:
-    title, least = item.title, Direction.AT_LEAST
-    found = metrics_of(name, title, item.done)
-    if item.height is not None:
-        found.append(Metric(f"{name}.height", title, "apex off the plan", "mm", 20.0))
-    if item.counts_beats:
-        found.append(Metric(f"{name}.beat", title, "touchdown off its beat", "ms", 20.0))
+def _rows(item: Item) -> Rows:
     legs, least_time = item.in_air
-    if legs:
-        found.append(Metric(f"{name}.air", title, "feet off the ground", "s", least_time, least))
-    return tuple(found)
+    return (
+        ("done", "done, stands 1 s later", f">= {item.done:g}"),
+        ("place", "lands off its place", "<= 40 mm"),
+        ("yaw", "lands off its heading", "<= 3 deg"),
+        ("torque", "peak torque / motors' line", "<= 1"),
+        ("asked", "asked for / motors' line", "<= 1"),
+        ("speed", "peak joint speed / limit", "<= 1"),
+        ("saturated", "saturated ticks", "<= 2 %"),
+        *([("height", "apex off the plan", "<= 20 mm")] if item.height is not None else []),
+        *([("beat", "touchdown off its beat", "<= 20 ms")] if item.counts_beats else []),
+        *([("air", "feet off the ground", f">= {least_time:g} s")] if legs else []),
+    )
 
 
 STUDIES = tuple(
-    Study(name, _metrics(name, item), partial(measure, name=name)) for name, item in ITEMS.items()
+    Study(name, {item.title: _rows(item)}, partial(measure, name=name), done="done")
+    for name, item in ITEMS.items()
 )
 """In the order of the report."""
 

@@ -16,23 +16,21 @@ from functools import lru_cache
 import numpy as np
 
 from benchmarks.command import add_sweep, positive, publish, run_sweep
-from benchmarks.probability_runs import NOT_READY, exam, model, played, world_of
+from benchmarks.probability_runs import NOT_READY, exam, model, motion_and_world, played, world_of
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.motion_failures import FELL
 from controller.sweeps.rows import Row
 from controller.sweeps.summary import rate_interval
 from go2_wbc.motion_plan import MotionPlan, Posture
-from motions import FeasibilityChecker, compile_motion, motion_names
+from motions import FeasibilityChecker, compile_motion, load_motion, motion_names
 
 PLAYS = 2000
 MOST_ASKED = 20
 """Worlds that are asked for at most, for each play that is wanted; the check passes half."""
-WORLDS = 5
-"""Worlds of each motion."""
+WORLDS = 5  # Worlds of each motion
 FIRST_WORLD = 10_000_000
 """Added to seeds, so that the worlds are not those that probabilities are fitted or judged in."""
-EVERY = 4
-"""One motion of so many is of the library."""
+EVERY = 4  # One motion of so many is of the library
 LIBRARY = "library"
 _STREAM = 13
 EXAMPLES = """
@@ -99,18 +97,13 @@ def render(rows: Sequence[Row], values: dict[str, object]) -> str:
         own = [row for row in played if row["stratum"] == stratum]
         done, fell = (sum(bool(row[name]) for row in own) for name in ("done", "fell"))
         lines.append(f"{stratum:<14}{asked:>8}{len(own):>8}{done:>8}{fell:>8}")
-    lines.append("-" * 80)
-    for row in played:
-        if row["fell"]:
-            where = f"friction {row['friction']:.2f}, {row['payload']:.1f} kg"
-            lines.append(f"seed {row['seed']} fell: {row['motion']:.40}, {where}")
-    fell = sum(bool(row["fell"]) for row in played)
-    high = rate_interval(fell, max(len(played), 1))[1]
-    lines.append(
-        f"{fell} of {len(played)} fell, at most {100.0 * high:.2f} % (95 %, Clopper-Pearson); "
-        f"bar 0: {'ok' if values['passed'] else 'NO'}"
+    fallen = [f"seed {row['seed']} fell: {motion_and_world(row)}" for row in played if row["fell"]]
+    high = rate_interval(len(fallen), max(len(played), 1))[1]
+    verdict = (
+        f"{len(fallen)} of {len(played)} fell, at most {100.0 * high:.2f} % "
+        f"(95 %, Clopper-Pearson); bar 0: {'ok' if values['passed'] else 'NO'}"
     )
-    return "\n".join(lines)
+    return "\n".join([*lines, "-" * 80, *fallen, verdict])
 
 
 def passed_play(seed: int) -> dict[str, object]:
@@ -123,14 +116,9 @@ def passed_play(seed: int) -> dict[str, object]:
     is_passed = FeasibilityChecker(model(), world=world).check(plan).ok
     harm = played(plan, world, FIRST_WORLD + seed) if is_passed else ()
     return {
-        "motion": name,
-        "stratum": stratum,
-        "friction": world.friction,
-        "payload": world.payload,
-        "passed": is_passed,
-        "done": is_passed and not harm,
-        "fell": FELL in harm,
-        "harm": "; ".join(harm),
+        **{"motion": name, "stratum": stratum},
+        **{"friction": world.friction, "payload": world.payload, "passed": is_passed},
+        **{"done": is_passed and not harm, "fell": FELL in harm, "harm": "; ".join(harm)},
     }
 
 
@@ -150,14 +138,11 @@ def _asked(number: int) -> tuple[str, str, MotionPlan]:
 @lru_cache(maxsize=1)
 def _library() -> list[str]:
     """The motions of the library that begin on four feet or sitting, shuffled."""
-    names = [
-        name
-        for name in motion_names()
-        if compile_motion(name, model()).entry in (Posture.STAND, Posture.SIT)
-    ]
-    return [names[k] for k in np.random.default_rng(_STREAM).permutation(len(names))]
+    begins = {name: load_motion(name).entry for name in motion_names()}
+    names = [name for name, entry in begins.items() if entry in (Posture.STAND, Posture.SIT)]
+    return [names[k] for k in _order(len(names))]
 
 
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=2)
 def _order(count: int) -> list[int]:
     return np.random.default_rng(_STREAM).permutation(count).tolist()

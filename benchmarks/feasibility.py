@@ -10,24 +10,22 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from functools import cache, partial
-from typing import Any
 
-from benchmarks.command import (
-    IDEAL,
-    RESULTS,
-    add_options,
-    measure_all,
-    on_sensors,
-    positive,
-    publish,
-)
-from benchmarks.study import Measurement, Metric, Study
+from benchmarks.command import RESULTS, add_options, measure_all, positive, publish
+from benchmarks.study import Study, TrialResult
 from benchmarks.validation_set.causes import CAUSES, examples, render_causes
 from benchmarks.validation_set.drawing import TEST
-from benchmarks.validation_set.physics import BORDER, BORDERS, play
+from benchmarks.validation_set.physics import (
+    BORDER,
+    BORDERS,
+    BORDERS_FILE,
+    borders_version,
+    play,
+    read_borders,
+    write_borders,
+)
 from benchmarks.validation_set.questions import (
     Question,
     draw_name,
@@ -35,24 +33,14 @@ from benchmarks.validation_set.questions import (
     dynamic_questions,
     questions,
 )
-from benchmarks.validation_set.scores import HALVES, Case, noticed, render, scores, wrong_ones
-from benchmarks.validation_set.stored import (
-    BORDERS_FILE,
-    borders_version,
-    digest,
-    read_borders,
-    read_outcomes,
-    write_borders,
-    write_outcomes,
-)
+from benchmarks.validation_set.scores import HALVES, Case, render, scores, wrong_ones
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.motion_failures import FELL, LENIENT, STOPS, STRICT, MotionFailures, failures_of
 from controller.sweeps.trials import Trial
-from go2_wbc.errors import CommandError
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker
 
-EXAM, DYNAMIC = "exam", "dynamic"
+EXAM, DYNAMIC, CAUSES_ROW, REFUSED = "exam", "dynamic", "causes", "refused"
 THRESHOLD = 0.95
 """Least precision and recall of refusals and of passes, test half, strict outcome."""
 BORDER_PRECISION, BORDER_RECALL = 0.85, 0.90
@@ -60,27 +48,17 @@ BORDER_PRECISION, BORDER_RECALL = 0.85, 0.90
 LEAST_DYNAMIC = 100
 """Dynamic motions of the test half that are judged, at least."""
 EXAMPLES = """
-python -m benchmarks feasibility              the exam: ten minutes, 2 cores;
-                                              twenty where nothing is stored
+python -m benchmarks feasibility              the exam: 20 minutes, 2 cores
 python -m benchmarks feasibility --motions 60
 python -m benchmarks feasibility --rows causes
 python -m benchmarks feasibility --rows dynamic --half test
 python -m benchmarks feasibility --wrong      also what is wrong, train half
-python -m benchmarks feasibility --remake     play all, store the outcomes
 python -m benchmarks feasibility --sensors imu
-                                              play all on its own sensors
+                                              on its own sensors
 python -m benchmarks feasibility --borders    bisect missing borders, with
                                               --remake all: half an hour
 """
-CAUSES_ROW = "causes"
-REFUSED = Metric("feasibility.refused", "verdict", "refused by the check", "", None)
-OUTCOMES = {
-    name: Metric(f"feasibility.{name}", "physics", f"went wrong, {name}", "", None)
-    for name in (STRICT, STOPS, LENIENT, FELL)
-}
-PLAN = "plan"
-"""The note that names motion and plan."""
-METRICS = (REFUSED, *OUTCOMES.values())
+OUTCOMES = (STRICT, STOPS, LENIENT, FELL)
 _BETWEEN = "; "
 
 
@@ -94,53 +72,37 @@ def register(subparsers: Subparsers) -> None:
         "Exit code 0 if precision and recall meet their thresholds, 1 if not.",
         examples=EXAMPLES,
     )
-    parser.add_argument(
-        "--rows", choices=(EXAM, DYNAMIC, CAUSES_ROW), default=EXAM, help="default %(default)s"
-    )
+    parser.add_argument("--rows", choices=QUESTIONS, default=EXAM, help="default %(default)s")
     parser.add_argument("--half", choices=HALVES, help="only the families of this half")
     parser.add_argument("--motions", metavar="N", type=positive, help="only the first N")
     parser.add_argument("--wrong", action="store_true", help="list what is wrong, train half")
-    parser.add_argument(
-        "--remake", action="store_true", help="ask physics again, and store what it says"
-    )
-    parser.add_argument(
-        "--borders", action="store_true", help="bisect where physics changes its mind"
-    )
+    parser.add_argument("--borders", action="store_true", help="bisect, and store them")
+    parser.add_argument("--remake", action="store_true", help="all borders, stored or not")
     add_options(parser, "sensors", "jobs", *RESULTS)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Bisect borders, or hold the exam and report it.
-
-    Raises:
-        CommandError: if outcomes on the robot's own sensors are to be stored.
-    """
-    if args.remake and args.sensors != IDEAL:
-        raise CommandError(
-            f"--remake stores outcomes on the true state: leave out --sensors {args.sensors}, "
-            "or --remake, which plays every motion anyway"
-        )
+    """Bisect borders, or hold the exam and report it."""
     if args.borders:
         return _bisect(args)
+    if args.remake:
+        print("--remake is for --borders: every motion is played, none is stored", file=sys.stderr)
+    asked = QUESTIONS[args.rows]()
+    seeds = [n for n, one in enumerate(asked) if args.half in (None, one.family.half)]
+    seeds = seeds[: args.motions]
+    cases = _measured(args, seeds)
     if args.rows == CAUSES_ROW:
-        cases = _measured(args, on_sensors(CAUSE_STUDY, args.sensors), examples())
-        wrong = sum(bool(case.refusal) is not bool(case.outcome.strict) for case in cases)
-        publish(args, {"wrong": wrong, "cases": _plain(cases)}, render_causes(cases))
-        return ExitCode.OK if not wrong else ExitCode.FAILED
-    asked = _QUESTIONS[args.rows]()
-    is_played = args.remake or args.sensors != IDEAL
-    chosen = on_sensors((REMADE if is_played else STORED)[args.rows], args.sensors)
-    scenario = replace(chosen, name=f"{chosen.name} {borders_version()}")
-    if not is_played and (why := read_outcomes()[1]):
-        print(f"{why}: physics is asked again", file=sys.stderr)
-    cases = _measured(args, scenario, asked)
+        wrong = sum(case.is_wrong for case in cases)
+        rows = [{"name": c.name, "refused": c.refusal, "wrong": c.outcome.strict} for c in cases]
+        publish(args, {"wrong": wrong, "cases": rows}, render_causes(cases))
+        return ExitCode.FAILED if wrong else ExitCode.OK
     judge = judged if args.rows == EXAM else judged_dynamic
-    is_ok, verdict = judge(cases, len(_seeds(args, asked)))
-    table = [render(cases), noticed(cases), *(wrong_ones(cases) if args.wrong else []), verdict]
+    is_ok, verdict = judge(cases, len(seeds))
     values = {"passed": is_ok, "scores": {n: s.as_dict() for n, s in scores(cases).items()}}
     if args.wrong:
         values["wrong"] = wrong_ones(cases)
-    publish(args, values, "\n".join(table))
+    wrong_lines = wrong_ones(cases) if args.wrong else []
+    publish(args, values, "\n".join([render(cases), *wrong_lines, verdict]))
     return ExitCode.OK if is_ok else ExitCode.FAILED
 
 
@@ -156,9 +118,7 @@ def dynamic() -> list[Question]:
     return dynamic_questions(read_borders())
 
 
-@cache
-def _known() -> dict[str, MotionFailures]:
-    return read_outcomes()[0]
+QUESTIONS = {EXAM: exam, DYNAMIC: dynamic, CAUSES_ROW: examples}
 
 
 @cache
@@ -167,78 +127,66 @@ def _checker() -> FeasibilityChecker:
     return FeasibilityChecker(RobotModel())
 
 
-def ask(trial: Trial, *, of: str, is_played: bool) -> Measurement:
+def ask(trial: Trial, found: TrialResult, of: str) -> None:
     """Check a motion and see what physics does; reasons are kept as notes.
 
     Args:
         trial: its seed is the number of the motion.
+        found: what is filled.
         of: the exam, its dynamic motions and more, or the known causes.
-        is_played: whether physics is asked although an outcome is stored.
     """
-    question = _QUESTIONS[of]()[trial.seed]
-    checker = _checker()
+    question, checker = QUESTIONS[of]()[trial.seed], _checker()
     plan = question.plan(checker.model)
-    report, name = checker.check(plan), f"{question.name} {digest(plan)}"
-    outcome = None if is_played else _known().get(name)
-    if outcome is None:
-        played = play(plan, checker.model, question.draw, trial.sensors)
-        outcome = failures_of(played, plan)
-    reasons = {REFUSED.name: tuple(dict.fromkeys(found.check for found in report.failures))}
-    reasons |= {metric.name: outcome.by(kind) for kind, metric in OUTCOMES.items()}
-    values = {metric: float(bool(reason)) for metric, reason in reasons.items()}
-    values[REFUSED.name] = float(not report.ok)
-    texts = {metric: _BETWEEN.join(reason) for metric, reason in reasons.items() if reason}
-    return Measurement(values, notes={**texts, PLAN: name})
+    report = checker.check(plan)
+    outcome = failures_of(play(plan, checker.model, question.draw, trial.sensors), plan)
+    refusal = tuple(dict.fromkeys(finding.check for finding in report.failures))
+    reasons = {REFUSED: refusal, **{kind: outcome.by(kind) for kind in OUTCOMES}}
+    found.values = {row: float(bool(reason)) for row, reason in reasons.items()}
+    found.values[REFUSED] = float(not report.ok)
+    found.notes = {row: _BETWEEN.join(reason) for row, reason in reasons.items()}
 
 
-_QUESTIONS = {EXAM: lambda: exam(), DYNAMIC: lambda: dynamic(), CAUSES: examples}
-STORED = {of: Study(of, METRICS, partial(ask, of=of, is_played=False)) for of in (EXAM, DYNAMIC)}
-REMADE = {
-    of: Study(f"{of}, played", METRICS, partial(ask, of=of, is_played=True))
-    for of in (EXAM, DYNAMIC)
-}
-CAUSE_STUDY = Study("causes", METRICS, partial(ask, of=CAUSES, is_played=True))
+def study_of(of: str) -> Study:
+    """The trials of these motions, with borders as they are now."""
+    return Study(
+        of if of == CAUSES_ROW else f"{of} {borders_version()}",
+        {
+            "verdict": ((REFUSED, "refused by the check", ""),),
+            "physics": [(kind, f"went wrong, {kind}", "") for kind in OUTCOMES],
+        },
+        partial(ask, of=of),
+        prefix="",
+    )
 
 
-def _measured(args: argparse.Namespace, scenario: Study, asked: Sequence[Question]) -> list[Case]:
-    """The cases of the motions asked for; outcomes are stored if that is asked for."""
-    found = measure_all(args, [(scenario, seed) for seed in _seeds(args, asked)])[scenario.name]
-    lost = {seed: one.reason for seed, one in found.items() if not one.values}
-    for seed, reason in sorted(lost.items()):
-        print(f"{asked[seed].name}: no result, {reason}", file=sys.stderr)
-    answered = {seed: one for seed, one in sorted(found.items()) if one.values}
-    cases = {seed: _case(asked[seed], one) for seed, one in answered.items()}
-    if args.remake and args.rows != CAUSES_ROW:
-        names = {seed: one.notes[PLAN] for seed, one in answered.items()}
-        new = {names[seed]: case.outcome for seed, case in cases.items()}
-        write_outcomes({**_known(), **new})
-    return list(cases.values())
+def _measured(args: argparse.Namespace, seeds: Sequence[int]) -> list[Case]:
+    """The cases of these motions."""
+    asked, study = QUESTIONS[args.rows](), study_of(args.rows).on(args.sensors)
+    found = measure_all(args, [(study, seed) for seed in seeds])[study.name]
+    for seed, one in sorted(found.items()):
+        if not one.values:
+            print(f"{asked[seed].name}: no result, {one.reason}", file=sys.stderr)
+    return [case_of(asked[seed], one) for seed, one in sorted(found.items()) if one.values]
 
 
-def _seeds(args: argparse.Namespace, asked: Sequence[Question]) -> list[int]:
-    """Numbers of the motions that are asked for."""
-    seeds = [n for n, one in enumerate(asked) if args.half in (None, one.family.half)]
-    return seeds[: args.motions]
+def case_of(question: Question, one: TrialResult) -> Case:
+    """What a trial found of a motion."""
 
+    def reasons(row: str) -> tuple[str, ...]:
+        return tuple(filter(None, one.notes[row].split(_BETWEEN)))
 
-def _case(question: Question, one: Measurement) -> Case:
-    def reasons(metric: Metric) -> tuple[str, ...]:
-        return tuple(filter(None, one.notes.get(metric.name, "").split(_BETWEEN)))
-
-    family = question.family
-    refusal = reasons(REFUSED) or (("refused",) if one.values[REFUSED.name] else ())
-    outcome = MotionFailures(*(reasons(metric) for metric in OUTCOMES.values()))
-    half = CAUSES if question.stratum == CAUSES else family.half
-    is_dynamic = family.is_dynamic
-    return Case(question.name, family.name, half, question.stratum, is_dynamic, refusal, outcome)
+    family, is_cause = question.family, question.stratum == CAUSES
+    refusal = reasons(REFUSED) or (("refused",) if one.values[REFUSED] else ())
+    outcome = MotionFailures(*map(reasons, OUTCOMES))
+    half = CAUSES if is_cause else family.half
+    return Case(question.name, half, question.stratum, family.is_dynamic, refusal, outcome)
 
 
 def judged(cases: Sequence[Case], asked: int) -> tuple[bool, str]:
     """Whether the test half meets the thresholds and no motion was lost, in words."""
-    found = scores(cases)
-    whole, border = found[f"{TEST} {STRICT}"], found[f"{TEST} border"]
-    lost = asked - len(cases)
-    is_ok = whole.least >= THRESHOLD and not lost
+    found, lost = scores(cases), asked - len(cases)
+    border = found[f"{TEST} border"]
+    is_ok = found[f"{TEST} {STRICT}"].least >= THRESHOLD and not lost
     is_ok &= border.refused_right.value >= BORDER_PRECISION
     is_ok &= border.wrong_refused.value >= BORDER_RECALL
     said = f"{len(cases)} motions, {lost} without a result. Test half: all four shares "
@@ -263,17 +211,9 @@ def _bisect(args: argparse.Namespace) -> int:
     found = measure_all(args, [(BORDERS, seed) for seed in wanted]) if wanted else {}
     for seed, one in found.get(BORDERS.name, {}).items():
         if one.values:
-            kept[names[seed]] = one.values.get(BORDER.name)
+            kept[names[seed]] = one.values.get(BORDER)
     write_borders({name: kept[name] for name in names if name in kept})
     none = sum(value is None for value in kept.values())
     text = f"{len(kept)} of {len(names)} borders, {none} beyond the bounds of their family"
     publish(args, {"borders": len(kept), "draws": len(names), "none": none}, text)
     return ExitCode.OK if len(kept) == len(names) else ExitCode.FAILED
-
-
-def _plain(cases: Sequence[Case]) -> list[dict[str, Any]]:
-    """Cases for JSON."""
-    rows: list[Mapping[str, Any]] = [
-        {"name": c.name, "refused": c.refusal, "wrong": c.outcome.strict} for c in cases
-    ]
-    return [dict(row) for row in rows]

@@ -26,18 +26,13 @@ from viz.render.frame_renderer import FrameRenderer, ShotStyle
 from viz.render.robot_meshes import PosedRobot, load_robot_visuals
 from viz.style import INK
 
-MOMENTS = 3
-"""Panels in a line; a long motion has two lines of them."""
-LONG = 15.0
-"""Length [s] from which on a motion is long."""
+MOMENTS = 3  # Panels in a line; a long motion has two lines of them
+LONG = 15.0  # Length [s] from which on a motion is long
 FAR = 0.3
 """Share of the greatest deviation from the start that a pose must have to be shown."""
-RATE = 25.0
-"""Samples of the recording a second [Hz]."""
-PANEL = (400, 300)
-"""Width and height [px] of a panel."""
-GAP = 6
-"""Width [px] of the gap between panels."""
+RATE = 25.0  # Samples of the recording a second [Hz]
+PANEL = (400, 300)  # Width and height [px] of a panel
+GAP = 6  # Width [px] of the gap between panels
 STYLE = ShotStyle(
     size=PANEL,
     azimuth=np.deg2rad(-42.0),
@@ -50,8 +45,7 @@ STYLE = ShotStyle(
     samples=3,
 )
 """A camera that nearly stands still, so that what differs between the panels is the robot."""
-SIZE_LIMIT = 60_000
-"""Largest picture [bytes]."""
+SIZE_LIMIT = 60_000  # Largest picture [bytes]
 FILM_SPEED, FILM_RATE = 2.0, 10.0
 """Seconds of the run in a second of the film, and pictures in a second of it."""
 LEAD = 0.6
@@ -67,8 +61,7 @@ FILM_STYLE = ShotStyle(
     detail=0.004,
 )
 """A camera that sees the robot from the left at first, and its face after the turn."""
-FILM_SIZE_LIMIT = 700_000
-"""Largest film [bytes]."""
+FILM_SIZE_LIMIT = 700_000  # Largest film [bytes]
 TRUNK_POINTS = np.array([[0.35, 0.0, 0.0], [-0.25, 0.0, 0.0], [0.0, 0.0, 0.15]])
 """Nose, tail, and a point [m] above the trunk, in its frame: they tell attitudes apart."""
 

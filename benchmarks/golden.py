@@ -12,11 +12,12 @@ import logging
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -63,13 +64,8 @@ class Stored:
 
     def write(self, file: Path) -> None:
         """Write it."""
-        np.savez_compressed(
-            file,
-            digests=self.digests,
-            sizes=self.sizes,
-            numbers=self.numbers,
-            lines=np.array(self.lines),
-        )
+        arrays: dict[str, Any] = {f.name: np.array(getattr(self, f.name)) for f in fields(self)}
+        np.savez_compressed(file, **arrays)
 
     @staticmethod
     def read(file: Path) -> Stored:
@@ -80,9 +76,8 @@ class Stored:
         """
         try:
             with np.load(file) as data:
-                return Stored(
-                    data["digests"], data["sizes"], data["numbers"], data["lines"].tolist()
-                )
+                arrays = {name: data[name] for name in ("digests", "sizes", "numbers")}
+                return Stored(**arrays, lines=data["lines"].tolist())
         except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
             raise ConfigError(f"cannot read the golden run {file}: {error}") from error
 
@@ -156,17 +151,14 @@ def replay(name: str, folder: Path) -> Ledger:
     return ledger
 
 
-def record_run(name: str, folder: Path) -> str | None:
-    """Run it and write it."""
-    (folder / f"{name}.npy").unlink(missing_ok=True)
-    Stored.of(replay(name, folder)).write(folder / f"{name}.npz")
+def work_on(name: str, act: str, folder: Path, tolerance: float) -> str | None:
+    """Run it and write it, or tell how it differs from what was written."""
+    file = folder / f"{name}.npz"
+    if act == COMPARE:
+        return difference(Stored.read(file), replay(name, folder), tolerance)
+    file.with_suffix(".npy").unlink(missing_ok=True)
+    Stored.of(replay(name, folder)).write(file)
     return None
-
-
-def compare_run(name: str, folder: Path, tolerance: float) -> str | None:
-    """Run it; how it differs from what was written."""
-    stored = Stored.read(folder / f"{name}.npz")
-    return difference(stored, replay(name, folder), tolerance)
 
 
 def results(
@@ -216,13 +208,12 @@ def run(args: argparse.Namespace) -> int:
     for name in names:
         if name not in RUNS:
             raise CommandError(unknown_name("run", name, RUNS))
-    work = partial(compare_run, folder=folder, tolerance=args.tolerance)
     if args.act == RECORD:
-        work = partial(record_run, folder=folder)
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise ConfigError(f"cannot make {folder}: {error.strerror}") from error
+    work = partial(work_on, act=args.act, folder=folder, tolerance=args.tolerance)
     is_equal, good = True, "recorded" if args.act == RECORD else "equal"
     with ProgressLine() as line:
         line.update(0.0, args.act)

@@ -11,28 +11,26 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from benchmarks.robots import DIRECTIONS, standing_failure
-from benchmarks.study import Direction, Measurement, Metric, Study
+from benchmarks.study import Rows, Study, TrialResult
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.geometry import moving_support_margins
 from go2_wbc.legs import LEGS, SIDES, Leg
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording, true_runs
 from go2_wbc.robot.model import RobotModel
 
-HOLD = 2.0
-"""Time [s] for which the paw is asked to be held."""
+HOLD = 2.0  # Time [s] for which the paw is asked to be held
 HELD_TIME = 1.9
 """Length [s] of the window in which the paw's height is measured: the hold without its edges."""
-_ITEM = "high five, either side"
-HELD_METRICS = (
-    Metric("five.height", _ITEM, "paw height held 2 s", "m", 0.60, Direction.AT_LEAST),
-    Metric("five.margin", _ITEM, "least CoM margin, held", "cm", 6.0, Direction.AT_LEAST),
-    Metric("five.margin_phase", _ITEM, "the same, on three legs", "cm", None, Direction.AT_LEAST),
-    Metric("five.load", _ITEM, "least foot load, held", "N", 25.0, Direction.AT_LEAST),
-    Metric("five.load_phase", _ITEM, "the same, on three legs", "N", None, Direction.AT_LEAST),
-    Metric("five.slip", _ITEM, "support slip at contact", "mm", 2.0),
-    Metric("five.torque", _ITEM, "peak torque / limit", "", 0.4),
-    Metric("five.joints", _ITEM, "least joint distance, held", "rad", 0.03, Direction.AT_LEAST),
-    Metric("five.joints_phase", _ITEM, "the same, on three legs", "rad", None, Direction.AT_LEAST),
+HELD_ROWS = (
+    ("height", "paw height held 2 s", ">= 0.6 m"),
+    ("margin", "least CoM margin, held", ">= 6 cm"),
+    ("margin_phase", "the same, on three legs", ">= cm"),
+    ("load", "least foot load, held", ">= 25 N"),
+    ("load_phase", "the same, on three legs", ">= N"),
+    ("slip", "support slip at contact", "<= 2 mm"),
+    ("torque", "peak torque / limit", "<= 0.4"),
+    ("joints", "least joint distance, held", ">= 0.03 rad"),
+    ("joints_phase", "the same, on three legs", ">= rad"),
 )
 RAISED = 0.5
 """Height [m] of the paw from which on it counts as raised; it is held at 0.6 m."""
@@ -40,13 +38,12 @@ SETTLE_TIME = 1.5
 """Time [s] from then to the first slap; the rest of the lift takes 0.3 s."""
 RETURN_TIME = 2.0
 """Time [s] after a slap within which the paw must be back in its place."""
-PAUSE = 0.3
-"""Time [s] from there to the next slap."""
+PAUSE = 0.3  # Time [s] from there to the next slap
 PLACE_TOLERANCE = 30.0
 """mm; a paw this near to its place is back in the pose. Dry friction in the joints keeps a part."""
 
 
-def measure_held(trial: Trial) -> Measurement:
+def measure_held(trial: Trial, found: TrialResult) -> None:
     """Give a high five with either paw; every value is the worse of both sides.
 
     - on three legs: the longest time in which the raised foot touches nothing;
@@ -61,22 +58,15 @@ def measure_held(trial: Trial) -> Measurement:
     - peak torque: largest |tau| / limit of any joint on three legs;
     - joint distance: least distance of any joint to its limit, the tighter published one for hips.
     """
-    worst: dict[str, float] = {}
+    sides: list[dict[str, float]] = []
     with TrialRobot(trial) as robot:
-        try:
-            robot.require(robot.go2.stand())
-            for side, leg in SIDES.items():
-                robot.truth.clear()
-                robot.require(robot.go2.high_five(side, hold=HOLD))
-                measured = _measured(robot.truth.recording(), leg)
-                for metric in HELD_METRICS:
-                    value = measured[metric.name]
-                    values = {0: value, 1: worst.get(metric.name, value)}
-                    worst[metric.name] = values[metric.direction.worst(values)]
-        except TrialFailed as failed:
-            reason = str(failed)
-            return Measurement(worst, {metric.name: reason for metric in HELD_METRICS}, reason)
-    return Measurement(worst)
+        robot.require(robot.go2.stand())
+        for side, leg in SIDES.items():
+            robot.truth.clear()
+            robot.require(robot.go2.high_five(side, hold=HOLD))
+            sides.append(_measured(robot.truth.recording(), leg))
+    for name, _, bar in HELD_ROWS:
+        found.values[name] = (min if bar.startswith(">=") else max)(side[name] for side in sides)
 
 
 def _measured(recorded: TruthRecording, leg: Leg) -> dict[str, float]:
@@ -86,15 +76,15 @@ def _measured(recorded: TruthRecording, leg: Leg) -> dict[str, float]:
     support = [other for other in LEGS if other is not leg]
     model = RobotModel()
     return {
-        "five.height": float(held.p_world_feet[:, leg, 2].min()),
-        "five.margin": 100.0 * least_margin(held, support),
-        "five.margin_phase": 100.0 * least_margin(on_three_legs, support),
-        "five.load": float(held.foot_forces[:, support].min()),
-        "five.load_phase": float(on_three_legs.foot_forces[:, support].min()),
-        "five.slip": 1000.0 * largest_slip(on_three_legs, support),
-        "five.torque": float(on_three_legs.torque_shares(model).max()),
-        "five.joints": held.joint_distance(model),
-        "five.joints_phase": on_three_legs.joint_distance(model),
+        "height": float(held.p_world_feet[:, leg, 2].min()),
+        "margin": 100.0 * least_margin(held, support),
+        "margin_phase": 100.0 * least_margin(on_three_legs, support),
+        "load": float(held.foot_forces[:, support].min()),
+        "load_phase": float(on_three_legs.foot_forces[:, support].min()),
+        "slip": 1000.0 * largest_slip(on_three_legs, support),
+        "torque": float(on_three_legs.torque_shares(model).max()),
+        "joints": held.joint_distance(model),
+        "joints_phase": on_three_legs.joint_distance(model),
     }
 
 
@@ -135,7 +125,7 @@ def largest_slip(recorded: TruthRecording, support: list[Leg]) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Impact:
-    """A ``force`` [N] on the held paw for ``duration`` [s]; ``name`` begins its metrics' names."""
+    """A ``force`` [N] on the held paw for ``duration`` [s]; ``name`` begins its rows' names."""
 
     name: str
     item: str
@@ -148,14 +138,12 @@ class Impact:
         return self.duration + RETURN_TIME + PAUSE
 
     @property
-    def metrics(self) -> tuple[Metric, Metric, Metric]:
+    def rows(self) -> Rows:
         """Directions survived, how far the paw stays off its place, and what the call said."""
-        count = float(len(DIRECTIONS))
-        survived, off = "directions survived, of 6", "paw off after 2 s"
         return (
-            Metric(f"{self.name}.survived", self.item, survived, "", count, Direction.AT_LEAST),
-            Metric(f"{self.name}.off", self.item, off, "mm", PLACE_TOLERANCE),
-            Metric(f"{self.name}.said", self.item, "high_five() said True", "", None),
+            (f"{self.name}.survived", "directions survived, of 6", f">= {len(DIRECTIONS)}"),
+            (f"{self.name}.off", "paw off after 2 s", f"<= {PLACE_TOLERANCE:g} mm"),
+            (f"{self.name}.said", "high_five() said True", ""),
         )
 
 
@@ -165,7 +153,7 @@ IMPACT_KINDS = (
 )
 
 
-def measure_impacts(trial: Trial) -> Measurement:
+def measure_impacts(trial: Trial, found: TrialResult) -> None:
     """Slap and lean on the paw while it is held, left for even seeds and right for odd ones.
 
     - directions survived: of six, along the axes of the robot's heading; the robot must not fall
@@ -174,18 +162,16 @@ def measure_impacts(trial: Trial) -> Measurement:
     - paw off its place: distance, in the world, of the foot's centre 2 s after the end of the
       force from where it was before; worst direction.
     """
-    values: dict[str, float] = {}
-    failures: dict[str, str] = {}
     for kind in IMPACT_KINDS:
-        survived, off, said = (metric.name for metric in kind.metrics)
-        distances, lost, values[said] = _hit_all(replace(trial, has_nominal_friction=True), kind)
-        values[survived] = float(len(DIRECTIONS) - len(lost))
+        survived, off, said = (name for name, *_ in kind.rows)
+        trial = replace(trial, has_nominal_friction=True)
+        distances, lost, found.values[said] = _hit_all(trial, kind)
+        found.values[survived] = float(len(DIRECTIONS) - len(lost))
         if distances:
-            values[off] = max(distances.values())
+            found.values[off] = max(distances.values())
         if lost:
             reason = "; ".join(f"{direction}: {why}" for direction, why in lost.items())
-            failures |= {survived: reason, off: reason}
-    return Measurement(values, failures)
+            found.failures |= {survived: reason, off: reason}
 
 
 def _hit_all(trial: Trial, kind: Impact) -> tuple[dict[str, float], dict[str, str], float]:
@@ -196,12 +182,10 @@ def _hit_all(trial: Trial, kind: Impact) -> tuple[dict[str, float], dict[str, st
         call of ``high_five`` said True.
     """
     side = ("left", "right")[trial.seed % 2]
-    distances: dict[str, float] = {}
-    lost: dict[str, str] = {}
-    remaining, said = list(DIRECTIONS), False
-    while remaining:
+    found, lost, said = dict[str, float](), dict[str, str](), False
+    while remaining := [d for d in DIRECTIONS if d not in lost and d not in found]:
         with TrialRobot(trial) as robot:
-            found: dict[str, float] = {}
+            before = len(found)
             ticks = _hits(robot, side, kind, remaining, found)
             robot.truth.on_tick = partial(next, ticks, None)
             try:
@@ -211,12 +195,10 @@ def _hit_all(trial: Trial, kind: Impact) -> tuple[dict[str, float], dict[str, st
             except TrialFailed as failed:
                 failure = str(failed)
             if failure is not None:
-                culprit = remaining[min(len(found), len(remaining) - 1)]
+                culprit = remaining[min(len(found) - before, len(remaining) - 1)]
                 lost[culprit] = f"{failure} ({robot.go2.last_outcome.reason})"
                 found.pop(culprit, None)
-            distances |= found
-        remaining = [d for d in remaining if d not in lost and d not in distances]
-    return distances, lost, float(said)
+    return found, lost, float(said)
 
 
 def _hits(
@@ -248,5 +230,5 @@ def _until(robot: TrialRobot, time: float) -> Iterator[None]:
         yield
 
 
-HELD = Study("high-five", HELD_METRICS, measure_held)
-IMPACTS = Study("slaps", tuple(m for kind in IMPACT_KINDS for m in kind.metrics), measure_impacts)
+HELD = Study("high-five", {"high five, either side": HELD_ROWS}, measure_held, "five")
+IMPACTS = Study("slaps", {kind.item: kind.rows for kind in IMPACT_KINDS}, measure_impacts, "")

@@ -18,7 +18,7 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
-from benchmarks.study import Measurement, Metric, Study
+from benchmarks.study import Study, TrialResult
 from controller.assembly import build_pilot
 from controller.modes import Aborted
 from controller.pilot import Pilot
@@ -38,19 +38,12 @@ from motions import compile_timeline, load_motion
 
 STATES = 200
 """Random states of a trial on which the two models are compared."""
-AGREEMENT_LIMIT = 1e-12
-MOTION_LIMIT = 1e-8
-"""N and N m; the robot weighs 158 N."""
-TORQUE_LIMIT = 1e-5
-"""N m"""
 ORACLE_PERIOD = 10
 """Ticks between those that the other back ends solve as well."""
-PLACO = "placo"
-"""It has a robot of its own, which carries nothing."""
+PLACO = "placo"  # It has a robot of its own, which carries nothing
 DRIVERS = ("condensed", PLACO)
 """Back ends that drive a whole run each, every solution audited."""
-BACKENDS = ("condensed", "full", PLACO)
-"""Back ends that are compared with the driving one."""
+BACKENDS = ("condensed", "full", PLACO)  # Back ends that are compared with the driving one
 # Blocks of a generalised vector by unit: base linear, base angular, joints.
 _BLOCKS = (slice(0, 3), slice(3, 6), slice(6, 18))
 _BASE_SPEED = 2.0  # m/s and rad/s, standard deviation; the fastest the Go2 trots
@@ -58,45 +51,37 @@ _JOINT_SPEED = 10.0  # rad/s, standard deviation; a third of the hip's limit
 _BASE_ACCELERATION = 20.0  # m/s^2 and rad/s^2; about two gravities
 _JOINT_ACCELERATION = 100.0  # rad/s^2
 _TORQUE = 10.0  # N m and N; half the hip's limit
-_SOLUTION_ITEM = "whole-body solutions"
 
-AGREEMENT_METRICS = tuple(
-    Metric(f"model.{name}", "Pinocchio against MuJoCo, relative", quantity, "", AGREEMENT_LIMIT)
-    for name, quantity in (
-        ("mass", "mass"),
-        ("com", "centre of mass"),
-        ("composite_inertia", "inertia"),
-        ("mass_matrix", "mass matrix"),
-        ("inverse_dynamics", "inverse dynamics"),
-        ("forward_dynamics", "forward dynamics"),
-    )
-)
-SOLUTION_METRICS = (
-    *(
-        Metric(f"wbc.motion_{name}", _SOLUTION_ITEM, f"motion, {name}", "SI", MOTION_LIMIT)
-        for name in BACKENDS
-    ),
-    Metric("wbc.torque", _SOLUTION_ITEM, "torque between back ends", "N m", TORQUE_LIMIT),
-    Metric("wbc.failures", _SOLUTION_ITEM, "QP failures", "", 0.0),
+QUANTITIES = {
+    "mass": "mass",
+    "com": "centre of mass",
+    "composite_inertia": "inertia",
+    "mass_matrix": "mass matrix",
+    "inverse_dynamics": "inverse dynamics",
+    "forward_dynamics": "forward dynamics",
+}
+SOLUTION_ROWS = (
+    *((f"motion_{name}", f"motion, {name}", "<= 1e-8 SI") for name in BACKENDS),
+    ("torque", "torque between back ends", "<= 1e-5 N m"),
+    ("failures", "QP failures", "<= 0"),
 )
 
 
-def measure_agreement(trial: Trial) -> Measurement:
+def measure_agreement(trial: Trial, found: TrialResult) -> None:
     """Largest relative error of each quantity over ``STATES`` random states."""
-    errors = model_agreement(STATES, trial.seed)
-    return Measurement({f"model.{name}": error for name, error in errors.items()})
+    found.values = model_agreement(STATES, trial.seed)
 
 
 class AuditedController(WholeBodyController):
     """Checks every solution, and solves some ticks with the other back ends as well."""
 
-    def __init__(self, model: RobotModel, backend: str, worst: dict[str, float]) -> None:
-        """Solve with ``backend``; keep what is larger than in ``worst`` there."""
+    def __init__(self, model: RobotModel, backend: str, found: TrialResult) -> None:
+        """Solve with ``backend``; the largest errors go to ``found``."""
         super().__init__(model, backend)
         others = [name for name in BACKENDS if name != backend]
         self._others = {name: WholeBodyController(model, name) for name in others}
         self._ticks = 0
-        self._worst = worst
+        self._found = found
 
     def solve(
         self, snapshot: Snapshot, reference: Reference, *, relax: bool = False
@@ -110,15 +95,13 @@ class AuditedController(WholeBodyController):
                     continue
                 other = controller.solve(snapshot, reference)
                 self._audit(snapshot, other)
-                self._note("wbc.torque", float(np.abs(solution.tau - other.tau).max()))
+                self._found.worsen("torque", float(np.abs(solution.tau - other.tau).max()))
         self._ticks += 1
         return solution
 
     def _audit(self, snapshot: Snapshot, solution: WbcSolution) -> None:
-        self._note(f"wbc.motion_{solution.backend}", motion_error(self.model, snapshot, solution))
-
-    def _note(self, metric: str, value: float) -> None:
-        self._worst[metric] = max(value, self._worst.get(metric, 0.0))
+        error = motion_error(self.model, snapshot, solution)
+        self._found.worsen(f"motion_{solution.backend}", error)
 
 
 def motion_error(model: RobotModel, snapshot: Snapshot, solution: WbcSolution) -> float:
@@ -152,7 +135,7 @@ def payload_wrench(
     return np.concatenate([force, np.cross(p, force)])
 
 
-def measure_solutions(trial: Trial) -> Measurement:
+def measure_solutions(trial: Trial, found: TrialResult) -> None:
     """Stand up, trot with a push, give a high five, sit; once with each of ``DRIVERS``.
 
     - motion: |M qdd + h - S' tau - sum J_i' f_i|, largest entry, of every solution that drives the
@@ -161,17 +144,16 @@ def measure_solutions(trial: Trial) -> Measurement:
     - torque between back ends: largest difference of any joint's torque for the same snapshot and
       reference, on every tenth tick.
     """
-    worst = {"wbc.failures": 0.0}
+    found.values["failures"] = 0.0
     for driver in DRIVERS:
         with closing(trial.plant()) as plant, closing(build_pilot(plant, Config())) as robot:
             loop = robot.runner.loop
-            loop.wbc = AuditedController(loop.model, driver, worst)
+            loop.wbc = AuditedController(loop.model, driver, found)
             try:
                 _exercise(robot, plant)
             except Aborted as aborted:
                 raise TrialFailed(f"driven by {driver}: {aborted}") from aborted
-            worst["wbc.failures"] += loop.telemetry.qp_failures
-    return Measurement(worst)
+            found.values["failures"] += loop.telemetry.qp_failures
 
 
 def _exercise(pilot: Pilot, plant: MujocoPlant) -> None:
@@ -240,19 +222,13 @@ def ideal_mujoco_model(description: RobotDescription) -> mujoco.MjModel:
 
 def random_sample(model: pin.Model, rng: np.random.Generator) -> DynamicsSample:
     """A state anywhere within the joint limits, with any orientation."""
-    q = np.empty(19)
-    q[:3] = rng.uniform(-1.0, 1.0, 3)
-    quaternion = rng.standard_normal(4)
-    q[3:7] = quaternion / np.linalg.norm(quaternion)
-    q[7:] = rng.uniform(model.lowerPositionLimit[7:], model.upperPositionLimit[7:])
+    place, quaternion = rng.uniform(-1.0, 1.0, 3), rng.standard_normal(4)
+    joints = rng.uniform(model.lowerPositionLimit[7:], model.upperPositionLimit[7:])
+    q = np.concatenate([place, quaternion / np.linalg.norm(quaternion), joints])
     speeds = np.repeat([_BASE_SPEED, _JOINT_SPEED], [6, 12])
     accelerations = np.repeat([_BASE_ACCELERATION, _JOINT_ACCELERATION], [6, 12])
-    return DynamicsSample(
-        q=q,
-        v=speeds * rng.standard_normal(18),
-        a=accelerations * rng.standard_normal(18),
-        tau=_TORQUE * rng.standard_normal(18),
-    )
+    v, a, tau = (s * rng.standard_normal(18) for s in (speeds, accelerations, _TORQUE))
+    return DynamicsSample(q, v, a, tau)
 
 
 def pinocchio_dynamics(model: pin.Model, sample: DynamicsSample) -> Dynamics:
@@ -342,14 +318,22 @@ def _write_state(
 def _composite_inertia(model: mujoco.MjModel, data: mujoco.MjData) -> Float[np.ndarray, "3 3"]:
     """Sum of every body's inertia about the common centre of mass (parallel-axis theorem)."""
     com = data.subtree_com[model.body(BASE_LINK).id]
-    total = np.zeros((3, 3))
-    for body in range(1, model.nbody):
-        R_world_inertia = data.ximat[body].reshape(3, 3)
-        arm = data.xipos[body] - com
-        total += R_world_inertia @ np.diag(model.body_inertia[body]) @ R_world_inertia.T
-        total += model.body_mass[body] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    return total
+    R, arm, mass = data.ximat.reshape(-1, 3, 3), data.xipos - com, model.body_mass
+    own = np.einsum("bij,bj,bkj->ik", R[1:], model.body_inertia[1:], R[1:])
+    square = np.einsum("b,bi,bi->", mass[1:], arm[1:], arm[1:]) * np.eye(3)
+    return own + square - np.einsum("b,bi,bj->ij", mass[1:], arm[1:], arm[1:])
 
 
-AGREEMENT = Study("model", AGREEMENT_METRICS, measure_agreement, has_sensors=False)
-SOLUTIONS = Study("solutions", SOLUTION_METRICS, measure_solutions, has_sensors=False)
+AGREEMENT = Study(
+    "model",
+    {
+        "Pinocchio against MuJoCo, relative": [
+            (name, quantity, "<= 1e-12") for name, quantity in QUANTITIES.items()
+        ]
+    },
+    measure_agreement,
+    sensors=None,
+)
+SOLUTIONS = Study(
+    "solutions", {"whole-body solutions": SOLUTION_ROWS}, measure_solutions, "wbc", sensors=None
+)

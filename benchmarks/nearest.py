@@ -24,7 +24,7 @@ from benchmarks.command import Benchmark
 from benchmarks.dynamic_motions import AFTERWARDS
 from benchmarks.dynamic_motions import FIRST_SEED as ROBOTS
 from benchmarks.robots import loads, plant_of
-from benchmarks.study import Direction, Measurement, Metric, Study
+from benchmarks.study import Study, TrialResult
 from controller.motion_measurement import during_motion
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.errors import MotionError, MotionInfeasible
@@ -37,14 +37,9 @@ from motions.language.timeline_data import NEAREST
 from motions.plan.dynamic_span import DynamicSpan
 from motions.plan.trajectory import as_written
 
-FIRST_SEED = 8600
-"""Seed of the first motion that is judged."""
-FOUND = 80.0
-"""Percent of the motions for which a plan must be found."""
+FIRST_SEED = 8600  # Seed of the first motion that is judged
 AS_REPORTED = 10.0
 """Difference [mm] between the measured and the reported deviation, of every motion."""
-PLANNING = 4.0
-"""Processor time [s] of planning, from cold and without imports."""
 LARGEST = {"x": 0.05, "y": 0.05, "z": 0.05, "roll": 0.25, "pitch": 0.25, "yaw": 0.35}
 """Greatest offset of the trunk [m, rad] by channel."""
 DIAGONALS = (("FL", "RR"), ("FR", "RL"))
@@ -52,26 +47,23 @@ FRONT = ("FL", "FR")
 ATTEMPTS = 40
 """Draws after which a kind that the check never refuses is a mistake of ours."""
 Maker = Callable[[np.random.Generator], Timeline]
-ITEM = "nearest to a refused motion"
-METRICS = (
-    Metric("nearest.found", ITEM, "plan found", "%", FOUND, Direction.AT_LEAST),
-    Metric("nearest.done", ITEM, "done, stands 1 s later", "", 1.0, Direction.AT_LEAST),
-    Metric("nearest.as_reported", ITEM, "off what was reported", "mm", AS_REPORTED),
-    Metric("nearest.reported", ITEM, "trunk off, as reported", "mm", None),
-    Metric("nearest.measured", ITEM, "trunk off, as measured", "mm", None),
-    Metric("nearest.angle", ITEM, "turned off, as reported", "deg", None),
-    Metric("nearest.angle_measured", ITEM, "turned off, as measured", "deg", None),
-    Metric("nearest.lag", ITEM, "late, as reported", "ms", None),
-    Metric("nearest.cpu", ITEM, "planning from cold", "s", PLANNING),
-    Metric("nearest.torque", ITEM, "peak torque / limit", "", 1.0),
-    Metric("nearest.speed", ITEM, "peak joint speed / limit", "", 1.0),
-    Metric("nearest.saturated", ITEM, "saturated ticks", "%", 2.0),
+ROWS = (
+    ("found", "plan found", ">= 80 %"),
+    ("done", "done, stands 1 s later", ">= 1"),
+    ("as_reported", "off what was reported", f"<= {AS_REPORTED:g} mm"),
+    ("reported", "trunk off, as reported", "mm"),
+    ("measured", "trunk off, as measured", "mm"),
+    ("angle", "turned off, as reported", "deg"),
+    ("angle_measured", "turned off, as measured", "deg"),
+    ("lag", "late, as reported", "ms"),
+    ("cpu", "planning from cold", "<= 4 s"),
+    ("torque", "peak torque / limit", "<= 1"),
+    ("speed", "peak joint speed / limit", "<= 1"),
+    ("saturated", "saturated ticks", "<= 2 %"),
 )
-OF_FOUND = tuple(metric.name for metric in METRICS[1:])
-"""What is asked only of a motion for which a plan was found."""
 
 
-def measure(trial: Trial) -> Measurement:
+def measure(trial: Trial, found: TrialResult) -> None:
     """Plan the nearest to one refused motion, and play it."""
     model, seed = RobotModel(), FIRST_SEED + trial.seed
     checker = FeasibilityChecker(model)
@@ -79,20 +71,23 @@ def measure(trial: Trial) -> Measurement:
     try:
         checked.report.raise_if_infeasible()
     except MotionInfeasible as error:
-        return Measurement({"nearest.found": 0.0}, not_asked=dict.fromkeys(OF_FOUND, str(error)))
-    values = {"nearest.found": 100.0, "nearest.cpu": planning_time(checked, model)}
-    reported = {name: reported_worst(checked.report, name) for name in ("off by", "turned off by")}
-    values["nearest.reported"], values["nearest.angle"] = reported.values()
-    values["nearest.lag"] = 1000.0 * max(late(checked), key=abs)
+        found.values["found"] = 0.0
+        found.not_asked = dict.fromkeys((name for name, *_ in ROWS[1:]), str(error))
+        return
+    found.values |= {"found": 100.0, "cpu": planning_time(checked, model)}
+    found.values["reported"] = reported_worst(checked.report, "off by")
+    found.values["angle"] = reported_worst(checked.report, "turned off by")
+    lags = (span.trajectory.lag for span in spans_of(checked))
+    found.values["lag"] = 1000.0 * max(lags, key=abs)
     try:
-        played = play(trial, checked, model)
+        found.values |= play(trial, checked, model)
     except TrialFailed as failed:
-        values["nearest.done"] = 0.0
-        return Measurement(values, {"nearest.done": str(failed)}, str(failed))
-    off = abs(played["nearest.measured"] - values["nearest.reported"])
-    values |= {"nearest.done": 1.0, "nearest.as_reported": off, **played}
-    failures = {"nearest.as_reported": f"{off:.1f} mm"} if off > AS_REPORTED else {}
-    return Measurement(values, failures)
+        found.values["done"], found.failures["done"] = 0.0, str(failed)
+        raise
+    off = abs(found.values["measured"] - found.values["reported"])
+    found.values |= {"done": 1.0, "as_reported": off}
+    if off > AS_REPORTED:
+        found.failures["as_reported"] = f"{off:.1f} mm"
 
 
 def planning_time(checked: CheckedMotion, model: RobotModel) -> float:
@@ -110,13 +105,8 @@ def reported_worst(report: FeasibilityReport, check: str) -> float:
     return float(np.max(series.values[:, series.subjects.index("trunk")]))
 
 
-def late(checked: CheckedMotion) -> list[float]:
-    """By how much [s] the parts that were solved are late."""
-    return [span.trajectory.lag for span in spans_of(checked)]
-
-
 def play(trial: Trial, checked: CheckedMotion, model: RobotModel) -> dict[str, float]:
-    """Play it from a stand, and stand for a second; what was measured, by metric.
+    """Play it from a stand, and stand for a second; what was measured, by row.
 
     Raises:
         TrialFailed: if the robot falls, or says that it has not done it.
@@ -128,8 +118,7 @@ def play(trial: Trial, checked: CheckedMotion, model: RobotModel) -> dict[str, f
         recorded = during_motion(robot.go2, robot.truth, checked.plan.name)
         robot.wait(AFTERWARDS)
     place, angle = off_written(recorded, checked, model)
-    values = {"measured": 1000.0 * place, "angle_measured": math.degrees(angle), **loads(recorded)}
-    return {f"nearest.{name}": value for name, value in values.items()}
+    return {"measured": 1000.0 * place, "angle_measured": math.degrees(angle), **loads(recorded)}
 
 
 def off_written(
@@ -261,7 +250,7 @@ KINDS: dict[str, Maker] = {
 """In turns, by the seed."""
 
 
-STUDIES = (Study("nearest", METRICS, measure),)
+STUDIES = (Study("nearest", {"nearest to a refused motion": ROWS}, measure),)
 
 
 BENCHMARK = Benchmark(

@@ -25,7 +25,7 @@ from go2_wbc.plant import MujocoPlant
 
 EXAMPLES = """
 python -m benchmarks plain                      the demo on ideal signals
-python -m benchmarks plain --sensors imu        the state from the robot's own sensors
+python -m benchmarks plain --sensors imu        on the robot's own sensors
 """
 NEAR = 1e-9
 """Relative and absolute: libraries of sines differ in the last bit, and sums of their values."""

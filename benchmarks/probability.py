@@ -12,13 +12,14 @@ import csv
 import io
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.command import add_sweep, positive, publish, run_sweep
 from benchmarks.probability_fit import Calibration, Sample, calibration, fit
-from benchmarks.probability_runs import DRAWN, seeds, trial
+from benchmarks.probability_runs import DRAWN, motion_and_world, seeds, trial
 from benchmarks.validation_set.drawing import TEST, TRAIN
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.sweeps.rows import Row
@@ -28,8 +29,7 @@ from motions.feasibility.probability import FILE, ProbabilityModel, fitted
 from viz.render.evidence_plot import reliability_figure
 from viz.style import PLOT_SUFFIXES, save_figure
 
-FITTED = (TRAIN, DRAWN)
-"""What the model may be fitted to."""
+FITTED = (TRAIN, DRAWN)  # What the model may be fitted to
 ERROR, BRIER_SHARE = 0.05, 0.5
 """Greatest expected calibration error, and Brier score over that of the base rate."""
 COLUMNS = ("seed", "motion", "half", "stratum", "friction", "payload", "refused", "done", "fell")
@@ -73,27 +73,21 @@ def run(args: argparse.Namespace) -> int:
     data = args.data and checked_output(args.data, [".csv"])
     plot = args.plot and checked_output(args.plot, PLOT_SUFFIXES)
     result = run_sweep(args, trial, seeds(args.motions))
-    model = fitted()
+    rows, model = result.rows, fitted()
     if args.fit:
-        model = fit(_samples(_of_halves(result.rows, *FITTED)))
-        store(model, result.rows, result.about["code"])
-    judged, falls = judge(model, _of_halves(result.rows, TEST)), passed_that_fell(result.rows)
+        model = fit(_samples(_of_halves(rows, *FITTED)))
+        store(model, rows, result.about["code"])
+    judged, falls = judge(model, _of_halves(rows, TEST)), passed_that_fell(rows)
     if data:
-        write_atomically(data, csv_of(model, result.rows))
+        write_atomically(data, csv_of(model, rows))
     if plot:
         save_reliability(judged, plot)
-    is_ok = is_calibrated(judged) and falls[0] == 0 and not result.failures
-    values = {
-        "passed": is_ok,
-        "error": judged.error,
-        "error_interval": judged.error_interval,
-        "brier": judged.brier,
-        "brier_of_base_rate": judged.brier_of_base_rate,
-        "bins": judged.bins,
-        "passed_that_fell": falls,
-        "lost": result.failures,
-    }
-    publish(args, values, render(judged, result.rows, result.failures))
+    is_ok = is_calibrated(judged) and not falls and not result.failures
+    counts = len(falls), sum(not row["refused"] for row in rows)
+    about = {"passed_that_fell": counts, "lost": result.failures}
+    publish(
+        args, {"passed": is_ok, **asdict(judged), **about}, render(judged, rows, result.failures)
+    )
     return ExitCode.OK if is_ok else ExitCode.FAILED
 
 
@@ -114,10 +108,9 @@ def store(model: ProbabilityModel, rows: Sequence[Row], code: str, file: Path = 
     ``code`` names that of the check and of physics, as files of sweeps do.
     """
     fitted_to = _of_halves(rows, *FITTED)
-    motions = {row["motion"] for row in fitted_to}
     about = {
         "fitted_by": "python -m benchmarks probability --fit",
-        "motions": len(motions),
+        "motions": len({row["motion"] for row in fitted_to}),
         "runs": len(fitted_to),
         "code": code,
     }
@@ -138,36 +131,31 @@ def is_calibrated(judged: Calibration) -> bool:
     return judged.error <= ERROR and judged.brier <= BRIER_SHARE * judged.brier_of_base_rate
 
 
-def passed_that_fell(rows: Sequence[Row]) -> tuple[int, int]:
-    """How many of the motions that the check passed in their world fell there, of how many."""
-    passed = [row for row in rows if not row["refused"]]
-    return sum(bool(row["fell"]) for row in passed), len(passed)
+def passed_that_fell(rows: Sequence[Row]) -> list[Row]:
+    """The motions that the check passed in their world and that fell there."""
+    return [row for row in rows if row["fell"] and not row["refused"]]
 
 
 def render(judged: Calibration, rows: Sequence[Row], lost: dict[int, str]) -> str:
     """The reliability table and the verdicts, at most 80 columns wide."""
-    falls = passed_that_fell(rows)
     lines = ["chance stated    done    runs", "-" * 80]
     for chance, share, count in judged.bins:
         low, high = rate_interval(round(share * count), count)
         bar = "#" * round(40 * share)
         lines.append(f"{chance:>13.2f}{share:>8.2f}{count:>8}   {low:.2f}-{high:.2f}  {bar}")
     low, high = judged.error_interval
+    fallen = passed_that_fell(rows)
+    of = sum(not row["refused"] for row in rows)
     lines += [
         "-" * 80,
         f"expected calibration error {judged.error:.3f} (95 %: {low:.3f} to {high:.3f}), "
         f"bar {ERROR:g}",
         f"Brier score {judged.brier:.3f}, of the base rate {judged.brier_of_base_rate:.3f}, "
         f"bar half of it",
-        f"motions that passed in their world and fell there: {falls[0]} of {falls[1]}",
+        f"motions that passed in their world and fell there: {len(fallen)} of {of}",
+        *(f"seed {row['seed']}: {motion_and_world(row)}" for row in fallen),
+        *(f"seed {seed} gave no row: {why:.55}" for seed, why in lost.items()),
     ]
-    lines += [
-        f"seed {row['seed']}: {row['motion']:.40}, friction {row['friction']:.2f}, "
-        f"{row['payload']:.1f} kg"
-        for row in rows
-        if row["fell"] and not row["refused"]
-    ]
-    lines += [f"seed {seed} gave no row: {why:.55}" for seed, why in lost.items()]
     return "\n".join(lines)
 
 
@@ -178,9 +166,9 @@ def csv_of(model: ProbabilityModel, rows: Sequence[Row]) -> bytes:
     table.writerow((*COLUMNS, "chance"))
     for row in rows:
         chance = model.probability(json.loads(str(row["margins"])))
-        values = [row[name] for name in COLUMNS]
-        values = [int(v) if isinstance(v, bool) else v for v in values]
-        values = [round(v, DIGITS) if isinstance(v, float) else v for v in values]
+        values = (row[name] for name in COLUMNS)
+        values = (int(v) if isinstance(v, bool) else v for v in values)
+        values = (round(v, DIGITS) if isinstance(v, float) else v for v in values)
         table.writerow([*values, round(chance, DIGITS)])
     return text.getvalue().encode()
 
@@ -192,13 +180,11 @@ def save_reliability(judged: Calibration, path: Path) -> Path:
     are not.
     """
     stated, done, counts = (np.array(column) for column in zip(*judged.bins, strict=True))
-    intervals = np.array(
-        [rate_interval(round(s * n), int(n)) for s, n in zip(done, counts, strict=True)]
-    )
+    intervals = [rate_interval(round(s * n), n) for _, s, n in judged.bins]
     low, high = judged.error_interval
     title = (
-        f"{int(counts.sum())} runs of the test half; expected error {judged.error:.3f} "
+        f"{counts.sum()} runs of the test half; expected error {judged.error:.3f} "
         f"({low:.3f} to {high:.3f})"
     )
-    figure = reliability_figure(stated, done, counts.astype(float), intervals, title=title)
+    figure = reliability_figure(stated, done, counts * 1.0, np.array(intervals), title=title)
     return save_figure(figure, path)

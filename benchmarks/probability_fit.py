@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -16,8 +17,7 @@ LEAST_SAMPLES = 20
 """Runs in which a check must have looked at something for its curve to be fitted."""
 CENTRE_SPREAD = 2.0
 """Standard deviation of a centre about 0 before anything is seen, as of all that follow."""
-USUAL_WIDTH = 0.3
-"""Width before anything is seen."""
+USUAL_WIDTH = 0.3  # Width before anything is seen
 WIDTH_SPREAD = 1.5
 """Standard deviation of the logarithm of a width before anything is seen."""
 FARTHEST, WIDTHS = (-10.0, 10.0), (1e-3, 3.0)
@@ -26,8 +26,7 @@ LEAST_SPREAD = 1e-2
 """Of a margin, as a share of its size, below which it counts as the same in all runs."""
 MOST = 20.0
 """Value of asinh beyond which more of it, or an infinite margin, tells nothing."""
-REST_SPREAD = 5.0
-"""Standard deviation of the log odds of the rest."""
+REST_SPREAD = 5.0  # Standard deviation of the log odds of the rest
 USUAL_LEAK, LEAK_SPREAD = -3.0, 1.5
 """Log odds of the leak before anything is seen, and their standard deviation."""
 BINS = 10
@@ -35,15 +34,8 @@ RESAMPLES = 1000
 _LEAST = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """One motion in one world.
-
-    Attributes:
-        motion: which motion; runs of one are not independent.
-        margins: the least margin of every check.
-        is_done: whether it was done.
-    """
+class Sample(NamedTuple):
+    """A motion in a world, its least margins, and its end; runs of one are not independent."""
 
     motion: str
     margins: Mapping[str, float]
@@ -130,23 +122,12 @@ def _loss(
     d_width = -(slope * z).sum(axis=0)  # of the logarithm of the width
     d_rest = float((pull * expit(-rest)).sum())
     d_leak = float((pull * ((1.0 - share) * expit(-leak) - share * expit(leak))).sum())
-    away = (parameters[k : 2 * k] - np.log(USUAL_WIDTH)) / WIDTH_SPREAD
-    leak_away = (leak - USUAL_LEAK) / LEAK_SPREAD
-    prior = (
-        0.5 * float(((centres / CENTRE_SPREAD) ** 2).sum())
-        + 0.5 * float((away**2).sum())
-        + 0.5 * (rest / REST_SPREAD) ** 2
-        + 0.5 * leak_away**2
-    )
-    gradient = np.concatenate(
-        [
-            -d_centre + centres / CENTRE_SPREAD**2,
-            -d_width + away / WIDTH_SPREAD,
-            [-d_rest + rest / REST_SPREAD**2],
-            [-d_leak + leak_away / LEAK_SPREAD],
-        ]
-    )
-    return prior - float(likelihood), gradient
+    gradient = -np.concatenate([d_centre, d_width, [d_rest, d_leak]])
+    # How far each is from its prior, over the spread of that.
+    spreads = np.repeat([CENTRE_SPREAD, WIDTH_SPREAD, REST_SPREAD, LEAK_SPREAD], [k, k, 1, 1])
+    usual = np.repeat([0.0, np.log(USUAL_WIDTH), 0.0, USUAL_LEAK], [k, k, 1, 1])
+    away = (parameters - usual) / spreads
+    return 0.5 * float(away @ away) - float(likelihood), gradient + away / spreads
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,30 +164,22 @@ def calibration(
     for _ in range(RESAMPLES):
         drawn = np.concatenate([rows[i] for i in rng.integers(len(rows), size=len(rows))])
         errors.append(_error(_bins(chances[drawn], done[drawn])))
-    low, high = np.percentile(errors, [2.5, 97.5])
-    rate = done.mean()
-    bins = _bins(chances, done)
-    return Calibration(
-        error=_error(bins),
-        error_interval=(float(low), float(high)),
-        brier=float(((chances - done) ** 2).mean()),
-        brier_of_base_rate=float(rate * (1.0 - rate)),
-        bins=bins,
-    )
+    low, high = np.percentile(errors, [2.5, 97.5]).tolist()
+    rate, bins = float(done.mean()), _bins(chances, done)
+    brier = float(((chances - done) ** 2).mean())
+    return Calibration(_error(bins), (low, high), brier, rate * (1.0 - rate), bins)
 
 
 def _bins(
     chances: Float[np.ndarray, " n"], done: Bool[np.ndarray, " n"]
 ) -> tuple[tuple[float, float, int], ...]:
     number: Int[np.ndarray, " n"] = np.minimum((chances * BINS).astype(int), BINS - 1)
-    found = []
-    for index in range(BINS):
-        inside = number == index
-        if inside.any():
-            found.append(
-                (float(chances[inside].mean()), float(done[inside].mean()), int(inside.sum()))
-            )
-    return tuple(found)
+    groups = (number == index for index in range(BINS))
+    return tuple(
+        (float(chances[own].mean()), float(done[own].mean()), int(own.sum()))
+        for own in groups
+        if own.any()
+    )
 
 
 def _error(bins: tuple[tuple[float, float, int], ...]) -> float:

@@ -12,16 +12,17 @@ import json
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from functools import lru_cache
+from operator import itemgetter
 
 import numpy as np
 
 from benchmarks.validation_set.drawing import TEST, TRAIN
-from benchmarks.validation_set.physics import play
+from benchmarks.validation_set.physics import play, read_borders
 from benchmarks.validation_set.questions import IMPOSSIBLE, Question, questions
 from benchmarks.validation_set.random_timelines import RandomTimeline, random_timelines
-from benchmarks.validation_set.stored import read_borders
-from controller.motion_failures import failures_of
+from controller.motion_failures import FELL, failures_of
 from controller.motion_measurement import measure_motion
+from controller.sweeps.rows import Row
 from controller.sweeps.trials import TrialFailed, TrialRobot
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.motion_plan import MotionPlan, Posture
@@ -38,8 +39,7 @@ FRICTION, PAYLOAD = (0.3, 1.0), (0.0, 4.0)
 """What the worlds are drawn from; half of them have no payload [kg]."""
 PLACE = ((-0.08, 0.08), (-0.04, 0.04), (0.0, 0.10))
 """Where its middle may be [m], in the frame of the base."""
-MASS_UNCERTAINTY, JOINT_FRICTION_UNCERTAINTY = 0.05, 0.5
-"""What the check is not told."""
+MASS_UNCERTAINTY, JOINT_FRICTION_UNCERTAINTY = 0.05, 0.5  # What the check is not told
 _STREAM = 12
 NOT_READY = "not ready"
 """What went wrong with a robot that did not get as far as the motion."""
@@ -47,22 +47,17 @@ NOT_READY = "not ready"
 
 def trial(seed: int) -> dict[str, object]:
     """The row of a seed: motion, verdict, margins (JSON) and outcome by the strict definition."""
-    if seed >= len(runs()):
-        return _drawn(drawn()[seed - len(runs())])
+    if seed >= len(runs()):  # a sentence
+        sentence, checker = drawn()[seed - len(runs())], FeasibilityChecker(model())
+        plan = checker.plan(sentence.line, check=False)
+        harm = failures_of(play(plan, model(), sentence.number), plan).strict
+        kind = (f"sentence {sentence.number}", DRAWN, DRAWN)
+        return _row(sentence.name, kind, checker.world, checker.check(plan), harm)
     question, plan = _asked(runs()[seed])
     world = world_of(seed)
     report = FeasibilityChecker(model(), world=world).check(plan)
     kind = (question.family.name, question.family.half, question.stratum)
     return _row(question.name, kind, world, report, played(plan, world, seed))
-
-
-def _drawn(sentence: RandomTimeline) -> dict[str, object]:
-    """The row of a sentence."""
-    checker = FeasibilityChecker(model())
-    plan = checker.plan(sentence.line, check=False)
-    harm = failures_of(play(plan, model(), sentence.number), plan).strict
-    kind = (f"sentence {sentence.number}", DRAWN, DRAWN)
-    return _row(sentence.name, kind, checker.world, checker.check(plan), harm)
 
 
 def _row(
@@ -72,20 +67,23 @@ def _row(
     report: FeasibilityReport,
     harm: tuple[str, ...],
 ) -> dict[str, object]:
-    family, half, stratum = kind
     return {
         "motion": motion,
-        "family": family,
-        "half": half,
-        "stratum": stratum,
+        **dict(zip(("family", "half", "stratum"), kind, strict=True)),
         "friction": world.friction,
         "payload": world.payload,
         "refused": not report.ok,
         "done": not harm,
-        "fell": "fell" in harm,
+        "fell": FELL in harm,
         "harm": "; ".join(harm),
         "margins": json.dumps({name: f.margin for name, f in report.margins.items()}),
     }
+
+
+def motion_and_world(row: Row) -> str:
+    """In words."""
+    where = f"friction {row['friction']:.2f}, {row['payload']:.1f} kg"
+    return f"{row['motion']:.40}, {where}"
 
 
 def world_of(seed: int) -> World:
@@ -171,6 +169,6 @@ def mixed(asked: Sequence[Question]) -> list[Question]:
     placed = [
         ((k + 0.5) / len(found), one)
         for found in kinds.values()
-        for k, (_, one) in enumerate(sorted(found, key=lambda item: item[0]))
+        for k, (_, one) in enumerate(sorted(found, key=itemgetter(0)))
     ]
-    return [one for _, one in sorted(placed, key=lambda item: item[0])]
+    return [one for _, one in sorted(placed, key=itemgetter(0))]

@@ -3,79 +3,57 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from benchmarks.robots import PUSH_TIME, force_of, standing_failure
-from benchmarks.study import Direction, Measurement, Metric, Study
+from benchmarks.study import Metric, Rows, Study, TrialResult
 from controller.modes import Mode
 from controller.sweeps.studies import set_off
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
 
-IMPULSE_STEP = 2.0
-"""N s between the impulses that are tried."""
+IMPULSE_STEP = 2.0  # N s between the impulses that are tried
 STANDS_AFTER, TROTS_AFTER = 3.0, 2.0
 """Time [s] after a push within which the robot must stand, or trot, again."""
-START_TIME = 1.5
-"""Time [s] from the command to trot to the first push."""
+START_TIME = 1.5  # Time [s] from the command to trot to the first push
 PHASES = 8
 """Instants of the stride, evenly spread, at which the trotting robot is pushed."""
 PUSHED_SPEED, SPEED_TOLERANCE = 0.5, 0.15
 """Speed [m/s], and error of its mean over the last two strides that counts as trotting again."""
+DIRECTIONS = {
+    "push_lateral": ("left", "right"),
+    "push_forward": ("forward",),
+    "push_backward": ("backward",),
+}
+"""In which an impulse must be survived, by row."""
 FailureOf = Callable[[float, str], str | None]
 """Pushes a robot with an impulse [N s] in a direction; says what went wrong, or None."""
 
 
-def push_metrics(prefix: str, item: str, lateral: float, forward: float) -> tuple[Metric, ...]:
-    """Both sides, ahead and back, with the thresholds [N s]; the last one informs only."""
-    thresholds = {"lateral": lateral, "forward": forward, "backward": None}
-    return tuple(
-        Metric(f"{prefix}_{name}", item, f"{name} impulse", "N s", least, Direction.AT_LEAST)
-        for name, least in thresholds.items()
-    )
+def measure_impulses(rows: Rows, failure_of: FailureOf, found: TrialResult) -> None:
+    """Search the largest impulse of every row, from its threshold or the last one on.
 
-
-def directions_of(metric: Metric) -> tuple[str, ...]:
-    """The directions in which an impulse must be survived."""
-    name = metric.quantity.split()[0]
-    return ("left", "right") if name == "lateral" else (name,)
-
-
-def measure_impulses(metrics: Sequence[Metric], failure_of: FailureOf) -> Measurement:
-    """Search the largest impulse of every metric, from its threshold or the last one on.
-
-    A metric below its threshold counts as failed, with what went wrong at the least impulse.
+    A row below its threshold counts as failed, with what went wrong at the least impulse.
     """
-    values: dict[str, float] = {}
-    failures: dict[str, str] = {}
     first = 0.0
-    for metric in metrics:
-        first = metric.threshold or first
-        largest, reason = _search(directions_of(metric), first, failure_of)
-        values[metric.name] = largest
-        if metric.threshold is not None and largest < metric.threshold:
-            failures[metric.name] = reason
-    return Measurement(values, failures)
+    for name, quantity, bar in rows:
+        threshold = Metric.of(name, "", quantity, bar).threshold
+        first, failures = threshold or first, dict[float, str]()
 
+        def survives(impulse: float, name: str = name, lost: dict[float, str] = failures) -> bool:
+            for direction in DIRECTIONS[name]:
+                if failure := failure_of(impulse, direction):
+                    lost[impulse] = f"{impulse:g} N s {direction}: {failure}"
+                    return False
+            return True
 
-def _search(directions: Sequence[str], first: float, failure_of: FailureOf) -> tuple[float, str]:
-    """The largest impulse [N s] that is survived, and why the least of the others is not."""
-    failures: dict[float, str] = {}
-
-    def survives(impulse: float) -> bool:
-        for direction in directions:
-            failure = failure_of(impulse, direction)
-            if failure is not None:
-                failures[impulse] = f"{impulse:g} N s {direction}: {failure}"
-                return False
-        return True
-
-    largest = largest_impulse(survives, first)
-    return largest, failures[min(failures)] if failures else ""
+        largest = found.values[name] = largest_impulse(survives, first)
+        if threshold is not None and largest < threshold:
+            found.failures[name] = failures[min(failures)]
 
 
 def largest_impulse(survives: Callable[[float], bool], first: float) -> float:
@@ -92,16 +70,21 @@ def largest_impulse(survives: Callable[[float], bool], first: float) -> float:
     return max(impulse, 0.0)
 
 
-STANDING = push_metrics(
-    "stand.push", "standing, push 0.1 s without a step", lateral=14.0, forward=18.0
+STANDING = (
+    ("push_lateral", "lateral impulse", ">= 14 N s"),
+    ("push_forward", "forward impulse", ">= 18 N s"),
+    ("push_backward", "backward impulse", ">= N s"),
 )
-TROTTING = push_metrics(
-    "trot.push", "trot 0.5 m/s, push 0.1 s, 8 phases", lateral=18.0, forward=24.0
+TO_THRESHOLD = {"left": 14.0, "right": 14.0, "forward": 18.0}
+MOVED = ("push_moved", "a foot moved, to threshold", "mm")
+TROTTING = (
+    ("push_lateral", "lateral impulse", ">= 18 N s"),
+    ("push_forward", "forward impulse", ">= 24 N s"),
+    ("push_backward", "backward impulse", ">= N s"),
 )
-MOVED = Metric("stand.push_moved", STANDING[0].item, "a foot moved, to threshold", "mm", None)
 
 
-def measure_standing(trial: Trial) -> Measurement:
+def measure_standing(trial: Trial, found: TrialResult) -> None:
     """Largest impulse on the base, in the worst of a metric's directions, that is survived.
 
     Survived is: 3 s later the robot stands (see ``standing_failure``), and never left standing
@@ -121,19 +104,17 @@ def measure_standing(trial: Trial) -> Measurement:
             except TrialFailed as failed:
                 return str(failed)
             steps = (robot.plant.p_world_feet - feet)[:, :2]
-            if impulse <= max(
-                m.threshold or 0.0 for m in STANDING if direction in directions_of(m)
-            ):
+            if impulse <= TO_THRESHOLD.get(direction, 0.0):
                 moved.append(float(np.linalg.norm(steps, axis=1).max()))
             if robot.go2.mode is not Mode.STANDING:
                 return f"the robot is {robot.go2.mode.value}"
             return standing_failure(robot)
 
-    found = measure_impulses(STANDING, failure_of)
-    return Measurement({**found.values, MOVED.name: 1000.0 * max(moved)}, found.failures)
+    measure_impulses(STANDING, failure_of, found)
+    found.values[MOVED[0]] = 1000.0 * max(moved)
 
 
-def measure_trotting(trial: Trial) -> Measurement:
+def measure_trotting(trial: Trial, found: TrialResult) -> None:
     """Largest impulse on the base that is survived at every phase, in a metric's directions.
 
     The phases are eight instants of the stride, evenly spread. Survived is: 2 s later the robot is
@@ -157,7 +138,7 @@ def measure_trotting(trial: Trial) -> Measurement:
         return "; ".join(lost) or None
 
     try:
-        return measure_impulses(TROTTING, failure_of)
+        measure_impulses(TROTTING, failure_of, found)
     finally:
         for robot in trotting:
             robot.close()
@@ -178,5 +159,12 @@ def _push(robot: TrialRobot, force: np.ndarray, phase: int) -> None:
         raise TrialFailed(f"walks at {speed:.2f} m/s two seconds after the push")
 
 
-STAND_PUSHES = Study("stand-pushes", (*STANDING, MOVED), measure_standing)
-TROT_PUSHES = Study("trot-pushes", TROTTING, measure_trotting)
+STAND_PUSHES = Study(
+    "stand-pushes",
+    {"standing, push 0.1 s without a step": (*STANDING, MOVED)},
+    measure_standing,
+    "stand",
+)
+TROT_PUSHES = Study(
+    "trot-pushes", {"trot 0.5 m/s, push 0.1 s, 8 phases": TROTTING}, measure_trotting, "trot"
+)

@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from benchmarks.command import Benchmark
 from benchmarks.robots import PUSH_TIME, force_of
-from benchmarks.study import Measurement, Metric, Study
+from benchmarks.study import Study, TrialResult
 from controller.modes import Mode
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.config import Config
@@ -27,14 +27,11 @@ from go2_wbc.plant.terrain import Boxes
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 
-FIRST_LAYOUT = 20
-"""Seed of the first layout of boxes that is judged."""
-BOX_HEIGHT = 0.08
-"""m"""
+FIRST_LAYOUT = 20  # Seed of the first layout of boxes that is judged
+BOX_HEIGHT = 0.08  # m
 FIRST_COMMANDS = 900
 """Seed of the first sequence of random commands that is judged."""
-FIRST_PUSH = 700
-"""Seed of the first series of pushes that is judged."""
+FIRST_PUSH = 700  # Seed of the first series of pushes that is judged
 IMPULSE, IMPULSE_AT_STOPS = 30.0, 20.0
 """N s of a push; and at the ends of the joints, where a trot has less room to answer."""
 AT_STOP = 0.01
@@ -76,19 +73,18 @@ def commanded(robot: TrialRobot, rng: np.random.Generator, count: int = 40) -> I
         yield 1.5
 
 
-def metrics_of(name: str, item: str) -> tuple[Metric, ...]:
-    """What is counted in every trial."""
-    return (
-        Metric(f"{name}.failures", item, "ticks without an answer", "", 0.0),
-        Metric(f"{name}.damped", item, "damped while upright", "", 0.0),
-        Metric(f"{name}.grave", item, "ticks beyond the limits", "%", 0.1),
-        Metric(f"{name}.relaxed", item, "ticks relaxed", "%", None),
-        Metric(f"{name}.unreported", item, "falls not reported", "", 0.0),
-        Metric(f"{name}.falls", item, "falls", "", None),
-    )
+ROWS = (
+    ("failures", "ticks without an answer", "<= 0"),
+    ("damped", "damped while upright", "<= 0"),
+    ("grave", "ticks beyond the limits", "<= 0.1 %"),
+    ("relaxed", "ticks relaxed", "%"),
+    ("unreported", "falls not reported", "<= 0"),
+    ("falls", "falls", ""),
+)
+"""What is counted in every trial."""
 
 
-def watch(name: str, robot: TrialRobot, course: Iterator[float]) -> Measurement:
+def watch(robot: TrialRobot, course: Iterator[float], found: TrialResult) -> None:
     """Follow the course until its end, or until the robot gives up.
 
     - damped while upright: 1 if the loop went limp at a tilt below 30 deg without calling it a
@@ -112,14 +108,13 @@ def watch(name: str, robot: TrialRobot, course: Iterator[float]) -> Measurement:
     shares = {"grave": counts.grave_ticks, "relaxed": counts.relaxed_ticks}
     go2.wait(0.0 if is_up(robot) else AFTERMATH)
     has_fallen, is_reported = robot.truth.fall() is not None, go2.mode is Mode.FALLEN
-    values = {
+    found.values |= {
         "failures": float(counts.qp_failures),
         "damped": float(was_damped),
         "unreported": float(has_fallen and not is_reported and not was_damped),
         "falls": float(has_fallen or is_reported),
         **{quantity: 100.0 * count / ticks for quantity, count in shares.items()},
     }
-    return Measurement({f"{name}.{quantity}": value for quantity, value in values.items()})
 
 
 def is_up(robot: TrialRobot) -> bool:
@@ -127,28 +122,28 @@ def is_up(robot: TrialRobot) -> bool:
     return robot.go2.mode not in (Mode.FALLEN, Mode.DAMPED)
 
 
-def measure_boxes(trial: Trial) -> Measurement:
+def measure_boxes(trial: Trial, found: TrialResult) -> None:
     """8 cm boxes at 1.0 m/s."""
     layout = FIRST_LAYOUT + trial.seed
     terrain = Boxes(height=BOX_HEIGHT, seed=layout)
     plant = MujocoPlant(terrain=terrain, seed=layout, sensors=trial.sensors)
-    return _measure("boxes", TrialRobot(plant), over_boxes, layout)
+    _measure(TrialRobot(plant), over_boxes, layout, found)
 
 
-def measure_pushes(trial: Trial) -> Measurement:
+def measure_pushes(trial: Trial, found: TrialResult) -> None:
     """30 N s while trotting at 0.5 m/s."""
     seed = FIRST_PUSH + trial.seed
     robot = TrialRobot(replace(trial, seed=seed, has_nominal_friction=True))
-    return _measure("pushes", robot, partial(pushed, impulse=IMPULSE, speed=0.5), seed)
+    _measure(robot, partial(pushed, impulse=IMPULSE, speed=0.5), seed, found)
 
 
-def measure_commands(trial: Trial) -> Measurement:
+def measure_commands(trial: Trial, found: TrialResult) -> None:
     """Random commands on a floor and with a mass that the controller does not know."""
     seed = FIRST_COMMANDS + trial.seed
-    return _measure("commands", TrialRobot(replace(trial, seed=seed)), commanded, seed)
+    _measure(TrialRobot(replace(trial, seed=seed)), commanded, seed, found)
 
 
-def measure_stops(trial: Trial) -> Measurement:
+def measure_stops(trial: Trial, found: TrialResult) -> None:
     """Trot so high that the calves come to their stops, or (odd seeds) so low; and be pushed."""
     seed = FIRST_PUSH + trial.seed
     height = (GREATEST_HEIGHT, LEAST_HEIGHT)[trial.seed % 2]
@@ -156,10 +151,14 @@ def measure_stops(trial: Trial) -> Measurement:
     robot = TrialRobot(replace(trial, seed=seed, has_nominal_friction=True), config)
     course = partial(pushed, impulse=IMPULSE_AT_STOPS, speed=0.8)
     with robot:
-        measured = watch("stops", robot, course(robot, np.random.default_rng(seed)))
+        watch(robot, course(robot, np.random.default_rng(seed)), found)
         distance = calf_distance(robot.truth.recording())
-    near = 100.0 * float((distance < AT_STOP).mean())
-    return Measurement({**measured.values, "stops.near": near})
+    found.values["near"] = 100.0 * float((distance < AT_STOP).mean())
+
+
+def _measure(robot: TrialRobot, course: Course, seed: int, found: TrialResult) -> None:
+    with robot:
+        watch(robot, course(robot, np.random.default_rng(seed)), found)
 
 
 def calf_distance(recorded: TruthRecording) -> Float[np.ndarray, " n"]:
@@ -169,25 +168,12 @@ def calf_distance(recorded: TruthRecording) -> Float[np.ndarray, " n"]:
     return distance[:, 2::3].min(axis=1)
 
 
-def _measure(name: str, robot: TrialRobot, course: Course, seed: int) -> Measurement:
-    with robot:
-        return watch(name, robot, course(robot, np.random.default_rng(seed)))
-
-
-PUSHES = "trot 0.5 m/s, three pushes of 30 N s"
-STOPS = "calves at their stops, pushes of 20 N s"
+NEAR = ("near", "ticks, a calf at its stop", "%")
 STUDIES = (
-    Study("boxes", metrics_of("boxes", "8 cm boxes, trot 1.0 m/s, 8 s"), measure_boxes),
-    Study("pushes", metrics_of("pushes", PUSHES), measure_pushes),
-    Study("commands", metrics_of("commands", "random commands, 60 s"), measure_commands),
-    Study(
-        "stops",
-        (
-            *metrics_of("stops", STOPS),
-            Metric("stops.near", STOPS, "ticks, a calf at its stop", "%", None),
-        ),
-        measure_stops,
-    ),
+    Study("boxes", {"8 cm boxes, trot 1.0 m/s, 8 s": ROWS}, measure_boxes),
+    Study("pushes", {"trot 0.5 m/s, three pushes of 30 N s": ROWS}, measure_pushes),
+    Study("commands", {"random commands, 60 s": ROWS}, measure_commands),
+    Study("stops", {"calves at their stops, pushes of 20 N s": (*ROWS, NEAR)}, measure_stops),
 )
 """In the order of the report."""
 

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from itertools import groupby
 from statistics import fmean, stdev
 
-from benchmarks.study import Measurement, Metric, Results, Study
+from benchmarks.study import Metric, Results, Study, TrialResult
 
 WIDTH = 80
 _LINE = " {quantity:<26}{threshold:>12}{n:>4}{mean:>8}{sd:>8}{worst:>8}{seed:>5}{falls:>5}{verdict}"
@@ -97,7 +97,7 @@ def summarise(scenarios: Sequence[Study], results: Results) -> Report:
     )
 
 
-def summarise_metric(metric: Metric, trials: Mapping[int, Measurement]) -> MetricResult:
+def summarise_metric(metric: Metric, trials: Mapping[int, TrialResult]) -> MetricResult:
     """One metric over the trials of its scenario, given by seed."""
     name = metric.name
     ordered = {s: trial for s, trial in sorted(trials.items()) if name not in trial.not_asked}

@@ -17,15 +17,14 @@ from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from go2_wbc.robot.state import RobotState
 from motions.postures import STAND_HEIGHT
 
-FRICTION_RANGE, MASS_RANGE = (0.6, 1.0), (0.95, 1.05)
-"""Friction, and factor on every mass and inertia of the robot; the controller is not told."""
+FRICTION_RANGE, MASS_RANGE, UNTOLD = (0.6, 1.0), (0.95, 1.05), (0.9, 1.1)
+"""Friction, and factor on every mass and inertia of the robot, twice; the controller is not told.
+"""
 HEIGHT_TOLERANCE, TILT_TOLERANCE = 0.02, math.radians(6.0)
 LOAD = 5.0
 """Force [N] on a foot that counts as loaded; a standing foot carries about 40 N."""
-SAMPLING = 10
-"""Ticks from one sample of the mean height to the next."""
-PUSH_TIME = 0.1
-"""Duration [s] of a push."""
+SAMPLING = 10  # Ticks from one sample of the mean height to the next
+PUSH_TIME = 0.1  # Duration [s] of a push
 DIRECTIONS: dict[str, tuple[float, float, float]] = {
     "forward": (1.0, 0.0, 0.0),
     "backward": (-1.0, 0.0, 0.0),
@@ -38,21 +37,15 @@ DIRECTIONS: dict[str, tuple[float, float, float]] = {
 
 
 def plant_of(
-    trial: Trial,
-    first_seed: int,
-    mass_range: tuple[float, float] = MASS_RANGE,
-    sensors: str | None = None,
+    trial: Trial, first_seed: int, mass_range: tuple[float, float] = MASS_RANGE
 ) -> MujocoPlant:
-    """A simulated robot under the conditions of the trial, whose ``sensors`` are the usual ones.
-
-    ``first_seed`` is that of the benchmark's first trial.
-    """
+    """A simulated robot under the conditions of a trial; that of seed 0 has ``first_seed``."""
     rng = np.random.default_rng(first_seed + trial.seed)
     friction, mass, yaw = (rng.uniform(*r) for r in (FRICTION_RANGE, mass_range, YAW_RANGE))
     return MujocoPlant(
         friction=float(friction),
         mass_scale=float(mass),
-        sensors=sensors or trial.sensors,
+        sensors=trial.sensors,
         seed=first_seed + trial.seed,
         initial_yaw=float(yaw),
         initial_joint_noise=JOINT_NOISE,

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from pathlib import Path
 
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.cli.progress import ProgressLine
@@ -48,20 +47,16 @@ def run(args: argparse.Namespace) -> int:
     for file in left_over:
         file.unlink()
     size = sum(file.stat().st_size for file in SHIPPED.glob("*.npz"))
-    print(f"{len(problems)} plans in {_shown(SHIPPED)}, {size / 1e3:.0f} kB")
+    print(f"{len(problems)} plans in {SHIPPED}, {size / 1e3:.0f} kB")
     return ExitCode.OK
 
 
 def shipped_problems(model: RobotModel) -> dict[str, PhaseProblem]:
     """The problems of all motions of the library, by their keys."""
-    found = {}
-    for line in _timelines():
-        if not line.in_order(PhaseKey):  # nothing in it is solved
-            continue
-        for span in compile_timeline(line, model).dynamic:
-            if isinstance(span.asked, PhaseProblem):
-                found[problem_key(span.asked, model, PlanLimits())] = span.asked
-    return found
+    solved = (line for line in _timelines() if line.in_order(PhaseKey))
+    asked = (span.asked for line in solved for span in compile_timeline(line, model).dynamic)
+    problems = (one for one in asked if isinstance(one, PhaseProblem))
+    return {problem_key(one, model, PlanLimits()): one for one in problems}
 
 
 def _timelines() -> Iterator[Timeline]:
@@ -72,7 +67,3 @@ def _timelines() -> Iterator[Timeline]:
         for parameter in motion.parameters:
             if isinstance(parameter.valid, Choice):
                 yield from (motion(**{parameter.name: word}) for word in parameter.valid.words)
-
-
-def _shown(path: Path) -> Path:
-    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path

@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from statistics import median
 
@@ -23,9 +23,8 @@ import numpy as np
 from benchmarks import speed_solves, speed_ticks
 from benchmarks.command import Benchmark
 from benchmarks.store import ROOT
-from benchmarks.study import Measurement, Metric, Study
+from benchmarks.study import Study, TrialResult
 from controller.sweeps.trials import Trial, TrialFailed
-from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, Timeline, compile_timeline, load_motion
 
@@ -38,16 +37,14 @@ LENGTHS = (10, 40)
 CHECK_BAR = 60.0
 """Greatest cost [ms] of checking 10 s of motion, with its probability."""
 _MOTIONS = (LIBRARY, *(f"{seconds} s" for seconds in LENGTHS))
-CHECK_METRICS = tuple(
-    metric
-    for motion in _MOTIONS
-    for metric in (
-        Metric(f"check.{motion}", f"10 s of motion: {motion}", "check", "ms", CHECK_BAR),
-        Metric(f"compile.{motion}", f"10 s of motion: {motion}", "compile", "ms", None),
+CHECKS = {
+    f"10 s of motion: {motion}": (
+        (f"check.{motion}", "check", f"<= {CHECK_BAR:g} ms"),
+        (f"compile.{motion}", "compile", "ms"),
     )
-)
-PROCESSES = 5
-"""Fresh processes of a trial; the median counts."""
+    for motion in _MOTIONS
+}
+PROCESSES = 5  # Fresh processes of a trial; the median counts
 ROBOT = "from controller import GO2Controller; go2 = GO2Controller()"
 STAND = f"{ROBOT}; raise SystemExit(not go2.stand())"
 DEMO = "from controller.cli.main import main; raise SystemExit(main(['demo', '--no-media']))"
@@ -61,14 +58,13 @@ STARTS: dict[str, tuple[str, str, float | None]] = {
 """What is started: its name, its code, and the processor time [s] that it may take."""
 _NO_BYTECODE = "PYTHONDONTWRITEBYTECODE"
 """Kept from the processes: a user's Python compiles a module once, not at every start."""
-START_METRICS = tuple(
-    metric
-    for name, (item, _, most) in STARTS.items()
-    for metric in (
-        Metric(f"startup.{name}.cpu", item, "processor time", "s", most),
-        Metric(f"startup.{name}.wall", item, "time by the clock", "s", None),
+STARTED = {
+    item: (
+        (f"{name}.cpu", "processor time", "s" if most is None else f"<= {most:g} s"),
+        (f"{name}.wall", "time by the clock", "s"),
     )
-)
+    for name, (item, _, most) in STARTS.items()
+}
 
 
 # --- checking a motion ----------------------------------------------------------------------------
@@ -83,7 +79,7 @@ def lively_motion(seconds: float) -> Timeline:
     return unit.repeat(max(round(seconds / unit.end), 1))
 
 
-def measure_checks(_trial: Trial) -> Measurement:
+def measure_checks(_trial: Trial, found: TrialResult) -> None:
     """Median of compiling and checking a motion of the library, a short and a long one."""
     model = RobotModel()
     checker = FeasibilityChecker(model)
@@ -94,45 +90,31 @@ def measure_checks(_trial: Trial) -> Measurement:
     for name, line in motions.items():
         plan = compile_timeline(line, model)
         checker.check(plan)  # what is prepared once for a robot is not counted
-        acts[f"check.{name}"] = partial(_chance, checker, plan)
+        acts[f"check.{name}"] = lambda plan=plan: checker.check(plan).probability
         acts[f"compile.{name}"] = partial(compile_timeline, line, model)
         durations[f"check.{name}"] = durations[f"compile.{name}"] = line.end
-    return Measurement(_medians(acts, durations))
-
-
-def _chance(checker: FeasibilityChecker, plan: MotionPlan) -> float:
-    """Check a plan, and say how likely it is done."""
-    return checker.check(plan).probability
-
-
-def _medians(
-    acts: Mapping[str, Callable[[], object]], durations: Mapping[str, float]
-) -> dict[str, float]:
-    """Median cost [ms] of each act for 10 s of motion."""
     spent: dict[str, list[float]] = {name: [] for name in acts}
     for _ in range(ROUNDS):
         for name, act in acts.items():
             start = time.thread_time_ns()
             act()
             spent[name].append((time.thread_time_ns() - start) / 1e6)
-    return {name: float(np.median(s)) * 10.0 / durations[name] for name, s in spent.items()}
+    found.values = {n: float(np.median(s)) * 10.0 / durations[n] for n, s in spent.items()}
 
 
 # --- how long a user waits: for a robot, for it to stand, for the demo's table --------------------
 
 
-def measure_startup(_trial: Trial) -> Measurement:
+def measure_startup(_trial: Trial, found: TrialResult) -> None:
     """Each start a few times in turn; the first of all, which may compile, does not count."""
     spent: dict[str, list[tuple[float, float]]] = {name: [] for name in STARTS}
     started(ROBOT)
     for _ in range(PROCESSES):
         for name, (_, code, _) in STARTS.items():
             spent[name].append(started(code))
-    values: dict[str, float] = {}
     for name, times in spent.items():
         cpu, wall = (median(column) for column in zip(*times, strict=True))
-        values |= {f"startup.{name}.cpu": cpu, f"startup.{name}.wall": wall}
-    return Measurement(values)
+        found.values |= {f"{name}.cpu": cpu, f"{name}.wall": wall}
 
 
 def started(code: str) -> tuple[float, float]:
@@ -161,14 +143,13 @@ def _children_time() -> float:
 
 
 STUDIES = (
-    Study("solves", speed_solves.METRICS, speed_solves.measure_solves),
-    Study("ticks", speed_ticks.TICK_METRICS, speed_ticks.measure_ticks),
-    Study("estimated", speed_ticks.ESTIMATED_METRICS, speed_ticks.measure_estimated),
-    Study("parts", speed_ticks.PART_METRICS, speed_ticks.measure_parts),
-    Study("commands", speed_ticks.COMMAND_METRICS, speed_ticks.measure_commands),
-    Study("checks", CHECK_METRICS, measure_checks),
-    Study("startup", START_METRICS, measure_startup),
-    Study("realtime", speed_ticks.REALTIME_METRICS, speed_ticks.measure_realtime),
+    Study("solves", speed_solves.TABLE, speed_solves.measure_solves, "solve"),
+    Study("ticks", speed_ticks.TICKS, speed_ticks.measure_ticks, "tick"),
+    Study("estimated", speed_ticks.ESTIMATED, speed_ticks.measure_estimated),
+    Study("commands", speed_ticks.COMMANDS, speed_ticks.measure_commands),
+    Study("checks", CHECKS, measure_checks, ""),
+    Study("startup", STARTED, measure_startup),
+    Study("realtime", speed_ticks.REALTIME, speed_ticks.measure_realtime),
 )
 BENCHMARK = Benchmark(
     "speed",
@@ -177,10 +158,7 @@ BENCHMARK = Benchmark(
     "late at the pace of the wall clock. Wants an idle machine.",
     STUDIES,
     takes="ten minutes",
-    examples=(
-        "solves ticks --runs 5",
-        "--json --out speed.json",
-    ),
+    examples=("solves ticks --runs 5", "--json --out speed.json"),
     runs=3,
 )
 register, run = BENCHMARK.register, BENCHMARK.run

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from benchmarks.speed_placo import BarePlaco
-from benchmarks.study import Direction, Measurement, Metric
+from benchmarks.study import TrialResult
 from controller.assembly import build_pilot
 from controller.modes import Aborted
 from controller.sweeps.trials import Trial, TrialFailed
@@ -25,35 +25,27 @@ from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.solution import WbcSolution
 from motions import compile_motion
 
-ROUNDS = 500
-"""Ticks of each contact mode that are solved."""
-WARM_UP = 50
-"""Rounds before the measurement."""
+ROUNDS = 500  # Ticks of each contact mode that are solved
+WARM_UP = 50  # Rounds before the measurement
 FASTER = {4: 3.5, 3: 3.5, 2: 3.0}
 """By number of stance feet (standing, high five, trot): how many times faster than PlaCo we are to
 be."""
-PLACO_TIME = {4: 60.0, 3: 55.0, 2: 43.0}
-"""Time [us] of PlaCo's tick on the machine for which other bars are meant; see ``slowness``."""
-READABLE = {"condensed": ("condensed", "daqp"), "full": ("full", "daqp")}
-"""Back end and solver of the readable forms."""
-
-_ITEM = "tick of the QP, {} stance feet"
+PLACO_TIME = 43.0
+"""Time [us] of PlaCo's tick on two feet on the machine for which bars in us are meant."""
 
 
-def _metrics(feet: int) -> tuple[Metric, ...]:
-    name, item, best = f"solve.{feet}", _ITEM.format(feet), Direction.AT_LEAST
+def _rows(feet: int) -> tuple[tuple[str, str, str], ...]:
     return (
-        Metric(f"{name}.ours", item, "ours, median", "us", None),
-        Metric(f"{name}.placo", item, "bare PlaCo, median", "us", None),
-        Metric(f"{name}.faster", item, "median: times faster", "", FASTER[feet], best),
-        Metric(f"{name}.ours_p99", item, "ours, 99 of 100", "us", None),
-        Metric(f"{name}.placo_p99", item, "bare PlaCo, 99 of 100", "us", None),
-        Metric(f"{name}.tail", item, "99 of 100: ours by PlaCo's", "", 1.0),
-        *(Metric(f"{name}.{form}", item, f"readable: {form}", "us", None) for form in READABLE),
+        (f"{feet}.ours", "ours, median", "us"),
+        (f"{feet}.placo", "bare PlaCo, median", "us"),
+        (f"{feet}.faster", "median: times faster", f">= {FASTER[feet]}"),
+        (f"{feet}.ours_p99", "ours, 99 of 100", "us"),
+        (f"{feet}.placo_p99", "bare PlaCo, 99 of 100", "us"),
+        (f"{feet}.tail", "99 of 100: ours by PlaCo's", "<= 1"),
     )
 
 
-METRICS = tuple(metric for feet in FASTER for metric in _metrics(feet))
+TABLE = {f"tick of the QP, {feet} stance feet": _rows(feet) for feet in FASTER}
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,11 +94,11 @@ class Recorder(WholeBodyController):
         return super().solve(snapshot, reference, relax=relax)
 
 
-def measure_solves(trial: Trial) -> Measurement:
+def measure_solves(trial: Trial, found: TrialResult) -> None:
     """The tick of the QP from the measured state to torques, ours and PlaCo's in turn."""
     model, config = RobotModel(), WbcConfig()
     ours, placo = WholeBodyController(model, config=config), BarePlaco(model, config)
-    values: dict[str, float] = {}
+    values = found.values
     for feet, ticks in recorded_ticks(trial).items():
         spent = interleaved(
             ticks,
@@ -118,16 +110,9 @@ def measure_solves(trial: Trial) -> Measurement:
         median = {name: float(np.median(times)) for name, times in spent.items()}
         p99 = {name: float(np.quantile(times, 0.99)) for name, times in spent.items()}
         for name in spent:
-            values |= {f"solve.{feet}.{name}": median[name], f"solve.{feet}.{name}_p99": p99[name]}
-        values[f"solve.{feet}.faster"] = median["placo"] / median["ours"]
-        values[f"solve.{feet}.tail"] = p99["ours"] / p99["placo"]
-        for name, (backend, solver) in READABLE.items():
-            form = WholeBodyController(model, backend, replace(config, solver=solver))
-            spent = interleaved(
-                ticks, {name: lambda tick, asked, form=form: form.solve(tick.snapshot, asked)}
-            )
-            values[f"solve.{feet}.{name}"] = float(np.median(spent[name]))
-    return Measurement(values)
+            values |= {f"{feet}.{name}": median[name], f"{feet}.{name}_p99": p99[name]}
+        values[f"{feet}.faster"] = median["placo"] / median["ours"]
+        values[f"{feet}.tail"] = p99["ours"] / p99["placo"]
 
 
 def interleaved(
@@ -161,7 +146,7 @@ def slowness(trotting: Sequence[Tick]) -> float:
     """
     placo = BarePlaco(RobotModel(), WbcConfig())
     spent = interleaved(trotting, {"placo": lambda tick, asked: placo.tick(tick.state, asked)})
-    return float(np.median(spent["placo"])) / PLACO_TIME[2]
+    return float(np.median(spent["placo"])) / PLACO_TIME
 
 
 def recorded_ticks(trial: Trial) -> Ticks:

@@ -14,21 +14,19 @@ import numpy as np
 
 from benchmarks.command import Benchmark
 from benchmarks.robots import feet_frame, loads, plant_of
-from benchmarks.study import Direction, Measurement, Metric, Study
+from benchmarks.study import Study, TrialResult
 from controller.motion_measurement import FULL
-from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
+from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from motions import CompiledPlan, Timeline, compile_timeline, deg
 
-FIRST_SEED = 4100
-"""Seed of the first trial that is judged."""
+FIRST_SEED = 4100  # Seed of the first trial that is judged
 STEP_AHEAD, STEP_ASIDE = 0.06, 0.03
 """Greatest way [m] of a random step, in either direction."""
-ROUNDS = 3
-"""Times that a walk is played."""
+ROUNDS = 3  # Times that a walk is played
 
 
 def random_steps(rng: np.random.Generator) -> Timeline:
@@ -83,45 +81,33 @@ def onwards(anchor: Anchor, pose: tuple[float, float, float]) -> Anchor:
     return Anchor(p, anchor.yaw + yaw)
 
 
-def measure_steps(trial: Trial) -> Measurement:
+def measure_steps(trial: Trial, found: TrialResult) -> None:
     """Random steps, twice: of the feet's final places, the one that is farthest off."""
     rng = np.random.default_rng(10 * FIRST_SEED + trial.seed)
     line, model = random_steps(rng), RobotModel()
     with TrialRobot(plant_of(trial, FIRST_SEED)) as robot:
         robot.require(robot.go2.stand())
         played = play(robot, compile_timeline(line, model))
-    return Measurement({f"step.{name}": played[name] for name in ("place", "torque", "saturated")})
+    found.values = {name: played[name] for name, *_ in STEP}
 
 
-def measure_walk(trial: Trial, gait: str) -> Measurement:
+def measure_walk(trial: Trial, found: TrialResult, gait: str) -> None:
     """The walk three times in a row: where it ends, against where it was to end."""
     plan = _walk(gait)
     off: list[tuple[float, float]] = []
     runs: list[dict[str, float]] = []
     with TrialRobot(plant_of(trial, FIRST_SEED)) as robot:
         robot.require(robot.go2.stand())
-        predicted = feet_frame(robot)
-        try:
-            for _ in range(ROUNDS):
-                runs.append(play(robot, plan))
-                predicted, ended = onwards(predicted, plan.end_pose), feet_frame(robot)
-                place = float(np.linalg.norm((ended.p_world - predicted.p_world)[:2]))
-                off.append((place, abs(wrap_angle(ended.yaw - predicted.yaw))))
-        except TrialFailed as failed:
-            name = f"{gait}.done"
-            return Measurement({name: len(runs) / ROUNDS}, {name: str(failed)}, str(failed))
-    return Measurement(
-        {
-            f"{gait}.done": 1.0,
-            f"{gait}.place1": 1000.0 * off[0][0],
-            f"{gait}.yaw1": math.degrees(off[0][1]),
-            f"{gait}.place3": 1000.0 * off[-1][0],
-            f"{gait}.yaw3": math.degrees(off[-1][1]),
-            **{
-                f"{gait}.{n}": max(run[n] for run in runs) for n in ("torque", "speed", "saturated")
-            },
-        }
-    )
+        predicted, found.values["done"] = feet_frame(robot), 0.0
+        for number in range(1, ROUNDS + 1):
+            runs.append(play(robot, plan))
+            predicted, ended = onwards(predicted, plan.end_pose), feet_frame(robot)
+            place = float(np.linalg.norm((ended.p_world - predicted.p_world)[:2]))
+            off.append((1000.0 * place, math.degrees(abs(wrap_angle(ended.yaw - predicted.yaw)))))
+            found.values["done"] = number / ROUNDS
+    found.values |= {name: max(run[name] for run in runs) for name in runs[0].keys() - {"place"}}
+    for number in (1, ROUNDS):
+        found.values[f"place{number}"], found.values[f"yaw{number}"] = off[number - 1]
 
 
 @cache
@@ -130,33 +116,32 @@ def _walk(gait: str) -> CompiledPlan:
     return compile_timeline(walk_with_paws(gait), RobotModel())
 
 
-def _walk_metrics(gait: str) -> tuple[Metric, ...]:
-    item = f"{gait} 2 m, two turns of 90 deg, three paws"
-    return (
-        Metric(f"{gait}.done", item, "share of three walks done", "", 1.0, Direction.AT_LEAST),
-        Metric(f"{gait}.place1", item, "end off its prediction", "mm", 50.0),
-        Metric(f"{gait}.yaw1", item, "heading off it", "deg", 4.0),
-        Metric(f"{gait}.place3", item, "end off, after three", "mm", 50.0),
-        Metric(f"{gait}.yaw3", item, "heading off, after three", "deg", 4.0),
-        Metric(f"{gait}.torque", item, "peak torque / limit", "", 1.0),
-        Metric(f"{gait}.speed", item, "peak joint speed / limit", "", 1.0),
-        Metric(f"{gait}.saturated", item, "saturated ticks", "%", 2.0),
-    )
-
-
-_STEP = "four random steps"
+STEP = (
+    ("place", "worst foot off its place", "<= 15 mm"),
+    ("torque", "peak torque / limit", "<= 1"),
+    ("saturated", "saturated ticks", "<= 2 %"),
+)
+WALK = (
+    ("done", "share of three walks done", ">= 1"),
+    ("place1", "end off its prediction", "<= 50 mm"),
+    ("yaw1", "heading off it", "<= 4 deg"),
+    ("place3", "end off, after three", "<= 50 mm"),
+    ("yaw3", "heading off, after three", "<= 4 deg"),
+    ("torque", "peak torque / limit", "<= 1"),
+    ("speed", "peak joint speed / limit", "<= 1"),
+    ("saturated", "saturated ticks", "<= 2 %"),
+)
 STUDIES = (
-    Study(
-        "step",
-        (
-            Metric("step.place", _STEP, "worst foot off its place", "mm", 15.0),
-            Metric("step.torque", _STEP, "peak torque / limit", "", 1.0),
-            Metric("step.saturated", _STEP, "saturated ticks", "%", 2.0),
-        ),
-        measure_steps,
+    Study("step", {"four random steps": STEP}, measure_steps),
+    *(
+        Study(
+            gait,
+            {f"{gait} 2 m, two turns of 90 deg, three paws": WALK},
+            partial(measure_walk, gait=gait),
+            done="done",
+        )
+        for gait in ("walk", "trot")
     ),
-    Study("walk", _walk_metrics("walk"), partial(measure_walk, gait="walk")),
-    Study("trot", _walk_metrics("trot"), partial(measure_walk, gait="trot")),
 )
 """In the order of the report."""
 

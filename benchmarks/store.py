@@ -9,12 +9,12 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Mapping
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 
-from benchmarks.study import Measurement, Study
+from benchmarks.study import Study, TrialResult
 from controller.sweeps.identity import SOURCES, identity
 from controller.sweeps.rows import SEED, Row
 from controller.sweeps.run import remove_sweep
@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parent.parent
 FOLDER = Path("out/benchmarks")
 """Where finished trials are kept, in a folder for each benchmark."""
 _WORDS = ("failures", "notes", "not_asked")
-"""Of a measurement, by metric."""
+"""Of a trial, by row."""
 
 
 def settings_header() -> dict[str, str]:
@@ -35,53 +35,47 @@ def settings_header() -> dict[str, str]:
     return {**identity(ROOT, (*SOURCES, "benchmarks")), "settings": settings}
 
 
+@dataclass(frozen=True, slots=True)
 class Store:
-    """The finished trials of studies. A context manager.
+    """The finished trials of studies.
 
     Attributes:
-        finished: measurements of the run that is resumed, by study and seed.
+        finished: trials of the run that is resumed, by study and seed.
+        files: by study.
     """
 
-    def __init__(self, folder: Path, studies: Iterable[Study], *, resume: bool) -> None:
-        """Begin anew, or go on with what is there.
+    finished: dict[tuple[str, int], TrialResult]
+    files: dict[str, SweepFile]
 
-        Raises:
-            ConfigError: if a file cannot be written, is not such a file, or holds trials under
-                other settings.
-        """
-        self.finished: dict[tuple[str, int], Measurement] = {}
-        self._files: dict[str, SweepFile] = {}
-        self._exits, header = ExitStack(), settings_header()
+    def add(self, study: Study, seed: int, result: TrialResult) -> None:
+        """Keep a trial: whoever kills the process leaves all of it or nothing."""
+        self.files[study.name].add(seed, row_of(study, result))
+
+
+@contextmanager
+def opened(folder: Path, studies: Iterable[Study], *, resume: bool) -> Iterator[Store]:
+    """Begin anew, or go on with what is there.
+
+    Raises:
+        ConfigError: if a file cannot be written, is not such a file, or holds trials under other
+            settings.
+    """
+    store, header = Store({}, {}), settings_header()
+    with ExitStack() as exits:
         for study in studies:
             file = file_of(folder, study)
             file.parent.mkdir(parents=True, exist_ok=True)
             if not resume:
                 remove_sweep(file)
             try:
-                rows = self._exits.enter_context(SweepFile(file, {"what": study.name, **header}))
+                rows = exits.enter_context(SweepFile(file, {"what": study.name, **header}))
             except ConfigError as error:
-                self._exits.close()
-                if not resume:
-                    raise
-                raise ConfigError(f"{error}; run without --resume to begin anew") from error
-            self._files[study.name] = rows
-            for row in rows.rows():
-                self.finished[study.name, int(row[SEED])] = measurement_of(study, row)
-
-    def add(self, study: Study, seed: int, measurement: Measurement) -> None:
-        """Keep a trial: whoever kills the process leaves all of it or nothing."""
-        self._files[study.name].add(seed, row_of(study, measurement))
-
-    def __enter__(self) -> Store:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._exits.close()
+                hint = "; run without --resume to begin anew" if resume else ""
+                raise ConfigError(f"{error}{hint}") from error
+            store.files[study.name] = rows
+            trials = {(study.name, int(row[SEED])): result_of(study, row) for row in rows.rows()}
+            store.finished.update(trials)
+        yield store
 
 
 def file_of(folder: Path, study: Study) -> Path:
@@ -89,16 +83,16 @@ def file_of(folder: Path, study: Study) -> Path:
     return folder / f"{study.name.replace(', ', '-').replace(' ', '_')}.sqlite"
 
 
-def row_of(study: Study, measurement: Measurement) -> Row:
-    """A measurement as the row of a sweep; nan is no value."""
-    values = {m.name: float(measurement.values.get(m.name, math.nan)) for m in study.metrics}
-    words = {name: json.dumps(dict(getattr(measurement, name))) for name in _WORDS}
-    return {**values, "reason": measurement.reason, **words}
+def row_of(study: Study, result: TrialResult) -> Row:
+    """A trial as the row of a sweep; nan is no value."""
+    values = {m.name: float(result.values.get(m.name, math.nan)) for m in study.metrics}
+    words = {name: json.dumps(getattr(result, name)) for name in _WORDS}
+    return {**values, "reason": result.reason, **words}
 
 
-def measurement_of(study: Study, row: Row) -> Measurement:
-    """The measurement that a row keeps."""
+def result_of(study: Study, row: Row) -> TrialResult:
+    """The trial that a row keeps."""
     values = {m.name: float(row[m.name]) for m in study.metrics}
-    words: Mapping[str, dict[str, str]] = {name: json.loads(str(row[name])) for name in _WORDS}
+    words = {name: json.loads(str(row[name])) for name in _WORDS}
     known = {name: value for name, value in values.items() if not math.isnan(value)}
-    return Measurement(known, reason=str(row["reason"]), **words)
+    return TrialResult(known, reason=str(row["reason"]), **words)

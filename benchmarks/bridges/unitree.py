@@ -10,15 +10,22 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.bridges.processes import require, wait_until
-from benchmarks.bridges.unitree_processes import MOVE, SPEED, Scene, driver, good_commands, scene
-from benchmarks.study import Direction, Measurement, Metric, Study
+from benchmarks.study import Study, TrialResult
 from controller.bridges.unitree import messages
 from controller.bridges.unitree.low_level import intact_message, low_cmd_message
 from controller.bridges.unitree.messages import decode_message, encode_message
 from controller.bridges.unitree.sport_api import Api
 from controller.sweeps.trials import Trial
 from go2_wbc.robot.state import JointCommand
+from tests.controller.bridges.processes import require, wait_until
+from tests.controller.bridges.unitree_processes import (
+    MOVE,
+    SPEED,
+    Scene,
+    driver,
+    good_commands,
+    scene,
+)
 
 MOVE_TIME, MOVE_PERIOD = 3.0, 0.05
 STREAM_TIME: Final = 10.0
@@ -29,28 +36,26 @@ DAMPED: Final = JointCommand.damping(3.0)
 DRIVE_LIMIT: Final = 120.0
 """Time [s] after which a drive counts as hanging."""
 
-_SPORT, _STREAM = "Unitree: sport service", "Unitree: lowstate and lowcmd, 500 Hz, 10 s"
-_DRIVE = "Unitree: our controller through UnitreePlant"
-SPORT_METRICS: Final = (
-    Metric("unitree.codes", _SPORT, "calls not answered 0", "", 0.0),
-    Metric("unitree.move", _SPORT, "Move 0.5: mean speed error", "m/s", 0.04),
-    Metric("unitree.latency", _SPORT, "round trip, median", "ms", 10.0),
-    Metric("unitree.latency_p99", _SPORT, "round trip, 99 %", "ms", None),
+SPORT: Final = (
+    ("codes", "calls not answered 0", "<= 0"),
+    ("move", "Move 0.5: mean speed error", "<= 0.04 m/s"),
+    ("latency", "round trip, median", "<= 10 ms"),
+    ("latency_p99", "round trip, 99 %", "ms"),
 )
-STREAM_METRICS: Final = (
-    Metric("unitree.lost_states", _STREAM, "lowstate lost", "%", 0.5),
-    Metric("unitree.lost_commands", _STREAM, "lowcmd lost or refused", "%", 0.5),
-    Metric("unitree.bad_crc", _STREAM, "bad checksums", "", 0.0),
-    Metric("unitree.rate", _STREAM, "lowstate rate", "Hz", None, Direction.AT_LEAST),
-    Metric("unitree.codec", _STREAM, "CPU encode + decode", "us", 50.0),
+STREAM: Final = (
+    ("lost_states", "lowstate lost", "<= 0.5 %"),
+    ("lost_commands", "lowcmd lost or refused", "<= 0.5 %"),
+    ("bad_crc", "bad checksums", "<= 0"),
+    ("rate", "lowstate rate", ">= Hz"),
+    ("codec", "CPU encode + decode", "<= 50 us"),
 )
-DRIVE_METRICS: Final = (
-    Metric("unitree.steps", _DRIVE, "steps not done, of 4", "", 0.0),
-    Metric("unitree.mae", _DRIVE, "trot 0.5, MAE of true speed", "m/s", 0.04),
+DRIVE: Final = (
+    ("steps", "steps not done, of 4", "<= 0"),
+    ("mae", "trot 0.5, MAE of true speed", "<= 0.04 m/s"),
 )
 
 
-def measure_sport(_trial: Trial) -> Measurement:
+def measure_sport(_trial: Trial, found: TrialResult) -> None:
     """The script of a SportClient: up, balance, move, stop, hello, Euler, down."""
     with scene() as at:
 
@@ -67,14 +72,12 @@ def measure_sport(_trial: Trial) -> Measurement:
         codes.append(code_of(Api.EULER, '{"x": 0.1, "y": 0.1, "z": 0.1}'))
         codes.append(code_of(Api.STAND_DOWN))
         require(at.height <= 0.12, f"StandDown left the base at {at.height:.2f} m")
-    return Measurement(
-        {
-            "unitree.codes": float(np.count_nonzero(codes)),
-            "unitree.move": abs(speed - SPEED),
-            "unitree.latency": 1e3 * float(np.median(trips)),
-            "unitree.latency_p99": 1e3 * float(np.percentile(trips, 99)),
-        }
-    )
+    found.values = {
+        "codes": float(np.count_nonzero(codes)),
+        "move": abs(speed - SPEED),
+        "latency": 1e3 * float(np.median(trips)),
+        "latency_p99": 1e3 * float(np.percentile(trips, 99)),
+    }
 
 
 def _move(at: Scene) -> float:
@@ -90,7 +93,7 @@ def _move(at: Scene) -> float:
     return float(np.mean(speeds)) if speeds else 0.0
 
 
-def measure_stream(_trial: Trial) -> Measurement:
+def measure_stream(_trial: Trial, found: TrialResult) -> None:
     """Answer every ``rt/lowstate`` with a damping command for ten seconds."""
     with scene() as at:
         states = at.bus.reader("rt/lowstate", depth=64)
@@ -111,15 +114,13 @@ def measure_stream(_trial: Trial) -> Measurement:
         time.sleep(0.2)
         good = good_commands(at.process.stop())
     expected = (ticks[-1] - ticks[0]) // 2 + 1
-    return Measurement(
-        {
-            "unitree.lost_states": 100.0 * (expected - len(set(ticks))) / expected,
-            "unitree.lost_commands": 100.0 * (sent - good) / sent,
-            "unitree.bad_crc": float(bad),
-            "unitree.rate": len(ticks) / elapsed,
-            "unitree.codec": codec_time(),
-        }
-    )
+    found.values = {
+        "lost_states": 100.0 * (expected - len(set(ticks))) / expected,
+        "lost_commands": 100.0 * (sent - good) / sent,
+        "bad_crc": float(bad),
+        "rate": len(ticks) / elapsed,
+        "codec": codec_time(),
+    }
 
 
 def codec_time() -> float:
@@ -136,8 +137,11 @@ def codec_time() -> float:
 
 
 def measure_drive(
-    _trial: Trial, simulator_options: Sequence[str] = (), driver_options: Sequence[str] = ()
-) -> Measurement:
+    _trial: Trial,
+    found: TrialResult,
+    simulator_options: Sequence[str] = (),
+    driver_options: Sequence[str] = (),
+) -> None:
     """Our controller in one process drives the simulator in another through ``UnitreePlant``.
 
     Stand, trot, high five, lie down; the speed is the simulator's truth.
@@ -150,11 +154,12 @@ def measure_drive(
     steps = [json.loads(line) for line in text.splitlines() if line.startswith("{")]
     undone = 4 - sum(bool(step["ok"]) for step in steps)
     reason = "; ".join(step["reason"] for step in steps if not step["ok"]) or text[-400:] + said
-    values = {"unitree.steps": float(undone)}
+    found.values["steps"] = float(undone)
     if speeds:
-        values["unitree.mae"] = float(np.mean(np.abs(np.array(speeds) - SPEED)))
-    failures = {"unitree.steps": reason} if undone else {}
-    return Measurement(values, failures, "" if speeds else reason)
+        found.values["mae"] = float(np.mean(np.abs(np.array(speeds) - SPEED)))
+    if undone:
+        found.failures["steps"] = reason
+    found.reason = "" if speeds else reason
 
 
 def _true_speeds(at: Scene, lines: list[str]) -> list[float]:
@@ -175,8 +180,11 @@ def _true_speeds(at: Scene, lines: list[str]) -> list[float]:
     return [speed for moment, speed in samples if start <= moment <= end]
 
 
-STUDIES: Final = (
-    Study("unitree-sport", SPORT_METRICS, measure_sport, group="unitree"),
-    Study("unitree-stream", STREAM_METRICS, measure_stream, group="unitree"),
-    Study("unitree-drive", DRIVE_METRICS, measure_drive, group="unitree"),
+STUDIES: Final = tuple(
+    Study(f"unitree-{name}", {f"Unitree: {item}": rows}, measure, "unitree", group="unitree")
+    for name, item, rows, measure in (
+        ("sport", "sport service", SPORT, measure_sport),
+        ("stream", "lowstate and lowcmd, 500 Hz, 10 s", STREAM, measure_stream),
+        ("drive", "our controller through UnitreePlant", DRIVE, measure_drive),
+    )
 )

@@ -14,8 +14,7 @@ from benchmarks.validation_set.scores import Case
 from go2_wbc.legs import LEGS
 from motions import Timeline, deg
 
-CAUSES = "cause"
-"""Stratum and half of these motions."""
+CAUSES = "cause"  # Stratum and half of these motions
 
 
 def _roll_and_back(_draw: Draw, s: float) -> Timeline:
@@ -108,8 +107,7 @@ def render_causes(cases: Sequence[Case]) -> str:
     for case in cases:
         name = case.name.removeprefix("cause: ").replace(" 0 ", " ")
         said, happened = ", ".join(case.refusal) or "passed", ", ".join(case.outcome.strict)
-        is_wrong = bool(case.refusal) is not bool(case.outcome.strict)
         text = f"{name[:22]:<24}{said[:26]:<28}{happened or 'done'}"
-        lines.append(f"{text[:73]:<74}{'WRONG' if is_wrong else 'ok'}")
-    wrong = sum(bool(case.refusal) is not bool(case.outcome.strict) for case in cases)
+        lines.append(f"{text[:73]:<74}{'WRONG' if case.is_wrong else 'ok'}")
+    wrong = sum(case.is_wrong for case in cases)
     return "\n".join([*lines, "-" * 80, f"{wrong} of {len(cases)} wrong."])

@@ -1,17 +1,23 @@
 """What physics makes of a motion, played in MuJoCo whatever the check says.
 
-And at which amplitude it changes its mind: bisected by playing.
+And at which amplitude it changes its mind: bisected by playing, and kept in a file.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
+from collections.abc import Mapping
+from pathlib import Path
 
-from benchmarks.study import Measurement, Metric, Study
+from benchmarks.study import Study, TrialResult
 from benchmarks.validation_set.questions import Question, draws
 from controller.motion_failures import failures_of
 from controller.motion_measurement import MotionMeasurement, measure_motion
-from controller.sweeps.trials import Trial, TrialRobot
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
+from go2_wbc.errors import ConfigError
+from go2_wbc.files import write_atomically
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
@@ -20,10 +26,9 @@ FRICTION = 0.5
 """Friction coefficient of the floor: the one that the check counts on."""
 NEAR, NEAR_SOLVED = 1.06, 1.13
 """Ratio of amplitudes, one done and one failed, at which the search ends."""
-STEP, STEP_SOLVED = 1.6, 1.25
-"""Ratio of amplitudes in the search for two that differ."""
-BORDER = Metric("feasibility.border", "border", "amplitude at which physics fails", "", None)
-PLAYS = Metric("feasibility.plays", "border", "motions played to find it", "", None)
+STEP, STEP_SOLVED = 1.6, 1.25  # Ratio of amplitudes in the search for two that differ
+BORDER, PLAYS = "border", "plays"
+BORDERS_FILE = Path(__file__).parent / "borders.json"
 
 
 def play(
@@ -48,18 +53,19 @@ def is_done(question: Question) -> bool:
     return not failures_of(play(plan, model, question.draw), plan).strict
 
 
-def measure_border(trial: Trial) -> Measurement:
+def measure_border(trial: Trial, found: TrialResult) -> None:
     """The border of draw number ``trial.seed``, or why there is none.
 
     From amplitude 1 in steps to the first one at which physics changes its mind, then by bisection.
     """
     family, number = draws()[trial.seed]
     step, near = (STEP_SOLVED, NEAR_SOLVED) if family.is_dynamic else (STEP, NEAR)
-    done, failed, plays = family.low, family.high, 0
+    done, failed = family.low, family.high
+    found.values[PLAYS] = 0.0
     is_low_done = is_high_failed = False
     middle = 1.0
     while not (is_low_done and is_high_failed) or failed / done > near:
-        plays += 1
+        found.values[PLAYS] += 1.0
         if is_done(Question(family, number, middle)):
             done, is_low_done = middle, True
         else:
@@ -68,11 +74,51 @@ def measure_border(trial: Trial) -> Measurement:
             middle = math.sqrt(done * failed)
         elif middle in (family.low, family.high):
             why = "even the highest amplitude is done" if is_low_done else "the lowest one fails"
-            return Measurement({PLAYS.name: float(plays)}, reason=why)
+            raise TrialFailed(why)
         else:
             onwards = middle * step if is_low_done else middle / step
             middle = min(max(onwards, family.low), family.high)
-    return Measurement({BORDER.name: math.sqrt(done * failed), PLAYS.name: float(plays)})
+    found.values[BORDER] = math.sqrt(done * failed)
 
 
-BORDERS = Study("borders", (BORDER, PLAYS), measure_border)
+BORDERS = Study(
+    "borders",
+    {
+        "border": (
+            (BORDER, "amplitude at which physics fails", ""),
+            (PLAYS, "motions played to find it", ""),
+        )
+    },
+    measure_border,
+    prefix="",
+)
+
+
+# --- the file of borders --------------------------------------------------------------------------
+
+
+def read_borders(path: Path = BORDERS_FILE) -> dict[str, float | None]:
+    """The amplitudes at which physics changes its mind, by draw.
+
+    Raises:
+        ConfigError: if the file is missing or damaged.
+    """
+    try:
+        kept = dict(json.loads(path.read_text()))
+    except (OSError, ValueError, TypeError) as error:
+        raise ConfigError(
+            f"{path}: cannot be read: {error}; make it anew with --borders"
+        ) from error
+    return {name: None if flip is None else float(flip) for name, flip in kept.items()}
+
+
+def borders_version(path: Path = BORDERS_FILE) -> str:
+    """A short hash of the file of borders: with others, the exam asks other questions."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:8] if path.exists() else "none"
+
+
+def write_borders(borders: Mapping[str, float | None], path: Path = BORDERS_FILE) -> None:
+    """Keep borders, one a line."""
+    rows = {name: value and round(value, 4) for name, value in borders.items()}
+    lines = (f"{json.dumps(name)}: {json.dumps(value)}" for name, value in rows.items())
+    write_atomically(path, ("{\n" + ",\n".join(lines) + "\n}\n").encode())

@@ -30,12 +30,9 @@ STRATA = (EASY, BORDER, IMPOSSIBLE)
 EASY_SHARE, BORDER_SHARE, IMPOSSIBLE_SHARE = (0.3, 0.7), (0.10, 0.25), (1.6, 2.5)
 """Amplitudes as shares of the one at which physics changes its mind; borders, off it."""
 
-FRESH = 100
-"""Number of the first draw that is not bisected."""
-FRESH_DYNAMIC = 110
-"""The same of what is asked besides of solved motions."""
-EACH = 4
-"""Motions that are asked besides of each dynamic family."""
+FRESH = 100  # Number of the first draw that is not bisected
+FRESH_DYNAMIC = 110  # The same of what is asked besides of solved motions
+EACH = 4  # Motions that are asked besides of each dynamic family
 
 
 @dataclass(frozen=True, slots=True)

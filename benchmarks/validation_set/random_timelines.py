@@ -20,8 +20,7 @@ from go2_wbc.legs import LEGS
 from motions import Timeline, deg, load_motion, motion_names
 
 _Item = TypeVar("_Item")
-FACTORS = (0.5, 0.8, 1.1, 1.5, 2.1, 3.0)
-"""By which a timeline grows, each times 0.9 to 1.1."""
+FACTORS = (0.5, 0.8, 1.1, 1.5, 2.1, 3.0)  # By which a timeline grows, each times 0.9 to 1.1
 _EASES = ("minimum_jerk", "minimum_jerk", "cubic", "in", "out")
 _GAITS = ("walk", "trot")
 _JOINTS = ("hip", "thigh", "calf")

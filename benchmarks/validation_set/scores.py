@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import re
 import textwrap
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
+
+from scipy.stats import binomtest
 
 from benchmarks.validation_set.drawing import TEST, TRAIN
 from benchmarks.validation_set.questions import STRATA
@@ -25,8 +27,6 @@ _ROW = "{name:<17}{n:>4}{done:>5}" + "".join(f"{{shares[{k}]:>13}}" for k in ran
 _HEADS = ("refused", "wrong:", "passed", "done:")
 _MORE = ("are wrong", "refused", "are done", "passed")
 HALVES = (TRAIN, TEST)
-Z = 1.96
-"""Quantile of the normal distribution for intervals of 95 %."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,6 @@ class Case:
 
     Attributes:
         name: unique.
-        family: its structure.
         half: train or test.
         stratum: how its amplitude was chosen.
         is_dynamic: whether it is solved.
@@ -44,7 +43,6 @@ class Case:
     """
 
     name: str
-    family: str
     half: str
     stratum: str
     is_dynamic: bool
@@ -56,9 +54,13 @@ class Case:
         """Whether there was anything to play."""
         return UNPLANNED not in self.outcome.strict
 
+    @property
+    def is_wrong(self) -> bool:
+        """Whether the check foretold something else than happened, strictly."""
+        return bool(self.refusal) is not bool(self.outcome.strict)
 
-@dataclass(frozen=True, slots=True)
-class Share:
+
+class Share(NamedTuple):
     """``right`` of ``n``, with the interval of Wilson (1927, J. Am. Stat. Assoc.) at 95 %."""
 
     right: int
@@ -72,13 +74,10 @@ class Share:
     @property
     def interval(self) -> tuple[float, float]:
         """Between which values the true share is; all of them if there is nothing."""
-        n = self.n
-        if not n:
+        if not self.n:
             return 0.0, 1.0
-        p, z2 = self.right / n, Z * Z
-        middle = (p + z2 / (2 * n)) / (1 + z2 / n)
-        half = Z / (1 + z2 / n) * math.sqrt(p * (1 - p) / n + z2 / (4 * n * n))
-        return max(0.0, middle - half), min(1.0, middle + half)
+        low, high = binomtest(self.right, self.n).proportion_ci(0.95, method="wilson")
+        return low, high
 
     def __str__(self) -> str:
         if not self.n:
@@ -97,22 +96,19 @@ def _short(share: float, digits: int) -> str:
     return text[:-1] if text.startswith("1") else text.removeprefix("0")
 
 
-@dataclass(frozen=True, slots=True)
-class Score:
+class Score(NamedTuple):
     """How well verdicts foretell one definition of the outcome.
 
     A refusal is a prediction that the motion goes wrong, a pass that it is done. Each can be
     judged by how often it is right (precision), and by how much it finds (recall).
 
     Attributes:
-        n: motions.
         refused_right: of the refused motions, those that go wrong: precision of refusals.
         wrong_refused: of the motions that go wrong, those refused: recall of refusals.
         passed_right: of the passed motions, those that are done: precision of passes.
         done_passed: of the motions that are done, those passed: recall of passes.
     """
 
-    n: int
     refused_right: Share
     wrong_refused: Share
     passed_right: Share
@@ -124,50 +120,38 @@ class Score:
         pairs = [(bool(case.refusal), bool(case.outcome.by(definition))) for case in cases]
         both, neither = pairs.count((True, True)), pairs.count((False, False))
         refused, failed = sum(r for r, _ in pairs), sum(f for _, f in pairs)
-        return Score(
-            len(pairs),
-            Share(both, refused),
-            Share(both, failed),
-            Share(neither, len(pairs) - refused),
-            Share(neither, len(pairs) - failed),
-        )
+        shares = ((both, refused), (both, failed))
+        shares += ((neither, len(pairs) - refused), (neither, len(pairs) - failed))
+        return Score(*(Share(*share) for share in shares))
 
     @property
-    def shares(self) -> tuple[Share, Share, Share, Share]:
-        """All four, in the order of the table."""
-        return self.refused_right, self.wrong_refused, self.passed_right, self.done_passed
+    def n(self) -> int:
+        """Motions."""
+        return self.refused_right.n + self.passed_right.n
 
     @property
     def least(self) -> float:
-        """The lowest of the four."""
-        return min(share.value for share in self.shares)
+        """The lowest of the four shares."""
+        return min(share.value for share in self)
 
     def as_dict(self) -> dict[str, object]:
         """Plain values, for JSON."""
-        names = ("refused_right", "wrong_refused", "passed_right", "done_passed")
-        shares = {name: getattr(self, name).as_dict() for name in names}
-        return {"n": self.n, **shares}
-
-
-def chosen(cases: Sequence[Case], *conditions: Callable[[Case], bool]) -> list[Case]:
-    """The cases for which all conditions hold."""
-    return [case for case in cases if all(condition(case) for condition in conditions)]
+        return {"n": self.n, **{name: share.as_dict() for name, share in self._asdict().items()}}
 
 
 def scores(cases: Sequence[Case]) -> dict[str, Score]:
     """By name, all rows of the table: halves, strata, dynamic motions, definitions."""
+    kinds: dict[str, Callable[[Case], bool]] = {
+        "strict": lambda case: True,
+        **{s: lambda case, s=s: case.stratum == s for s in STRATA},
+        "dynamic": lambda case: case.is_dynamic,
+        "solved": lambda case: case.is_dynamic and case.has_plan,
+    }
     found: dict[str, Score] = {}
     for half in HALVES:
-        own = chosen(cases, lambda case, half=half: case.half == half)
-        found[f"{half} strict"] = Score.of(own)
-        for stratum in STRATA:
-            part = chosen(own, lambda case, stratum=stratum: case.stratum == stratum)
-            found[f"{half} {stratum}"] = Score.of(part)
-        dynamic = chosen(own, lambda case: case.is_dynamic)
-        found[f"{half} dynamic"] = Score.of(dynamic)
-        found[f"{half} solved"] = Score.of(chosen(dynamic, lambda case: case.has_plan))
-        for definition in (STOPS, LENIENT, FELL):
-            found[f"{half} {definition}"] = Score.of(own, definition)
+        own = [case for case in cases if case.half == half]
+        found |= {f"{half} {name}": Score.of(filter(is_it, own)) for name, is_it in kinds.items()}
+        found |= {f"{half} {by}": Score.of(own, by) for by in (STOPS, LENIENT, FELL)}
     return found
 
 
@@ -179,34 +163,25 @@ def render(cases: Sequence[Case]) -> str:
         "-" * 80,
     ]
     for name, score in scores(cases).items():
-        shares = [str(share) for share in score.shares]
+        shares = [str(share) for share in score]
         lines.append(_ROW.format(name=name, n=score.n, done=score.done_passed.n, shares=shares))
         if name.endswith(FELL):
             lines.append("-" * 80)
-    return "\n".join([*lines, *_causes(cases)])
-
-
-def _causes(cases: Sequence[Case]) -> list[str]:
-    """How often each thing went wrong, in all motions; several may in one."""
     kinds = Counter(re.sub(r"[\d.]+ ", "", why) for c in cases for why in c.outcome.by(STRICT))
     counts = ", ".join(f"{kind} {n}" for kind, n in kinds.most_common())
-    return textwrap.wrap(f"What went wrong, strictly: {counts or 'nothing'}.", 80)
-
-
-def noticed(cases: Sequence[Case]) -> str:
-    """How many of the motions that were played and went wrong ``play`` says so of."""
+    lines += textwrap.wrap(f"What went wrong, strictly: {counts or 'nothing'}.", 80)
     wrong = [case.outcome.strict for case in cases if case.outcome.strict and case.has_plan]
     told = sum(NOT_DONE in reasons for reasons in wrong)
-    return f"Of {len(wrong)} motions that were played and went wrong, `play` says so of {told}."
+    said = f"Of {len(wrong)} motions that were played and went wrong, `play` says so of {told}."
+    return "\n".join([*lines, said])
 
 
 def wrong_ones(cases: Sequence[Case]) -> list[str]:
     """The motions of the train half on which the check was wrong; those of the other are secret."""
-    lines: list[str] = []
-    for case in chosen(cases, lambda case: case.half == TRAIN):
-        refused, failed = bool(case.refusal), bool(case.outcome.strict)
-        if refused is not failed:
-            said = f"refused ({', '.join(case.refusal)})" if refused else "passed"
-            happened = ", ".join(case.outcome.strict) or "done"
-            lines.append(f"{case.name} ({case.stratum}): {said}; {happened}")
-    return lines
+    return [
+        f"{case.name} ({case.stratum}): "
+        + (f"refused ({', '.join(case.refusal)})" if case.refusal else "passed")
+        + f"; {', '.join(case.outcome.strict) or 'done'}"
+        for case in cases
+        if case.half == TRAIN and case.is_wrong
+    ]

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from benchmarks import balance, disturbed
-from benchmarks.balance import STUDIES, dropped, heading_force, impulse_at, trots_on
-from benchmarks.locomotion import MASS_RANGE
-from benchmarks.robots import PUSH_TIME, plant_of
+from benchmarks.balance import dropped, heading_force, impulse_at, trots_on
+from benchmarks.robots import PUSH_TIME, UNTOLD, plant_of
+from benchmarks.study import chosen_studies
 from controller.modes import Mode
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.safety import FallDetector, SafetyConfig
+from tests.unchecked import run_trials
 
 
 def measured(name: str, seed: int) -> dict[str, float]:
-    scenario = next(s for s in STUDIES if s.name == name)
-    return dict(scenario.measure(Trial(seed)).values)
+    (study,) = chosen_studies(balance.STUDIES, [name])
+    return study.run(seed).values
 
 
 @pytest.mark.parametrize(
@@ -46,8 +48,8 @@ def test_a_drop_begins_above_the_floor() -> None:
     ("name", "seed"),
     [("recover", 1), ("sensed-recover", 1), ("sensed-gaits", 9), ("sensed-stand-90", 1)],
 )
-def test_a_robot_stands_again(name: str, seed: int) -> None:
-    assert measured(name, seed) == {name: 1.0}
+def test_a_robot_stands_again(name: str, seed: int, tmp_path: Path) -> None:
+    assert run_trials("balance", name, [seed], tmp_path)[name][seed].values == {name: 1.0}
 
 
 @pytest.mark.parametrize(("seed", "phase", "side"), [(0, 5, 1.0), (1, 4, 1.0), (4, 12, -1.0)])
@@ -56,7 +58,7 @@ def test_a_trot_holds_a_push_by_a_fifth_harder_than_is_asked(
 ) -> None:
     # With all the weight on the attitude the legs in the air were swung aside, and it fell here.
     angle, impulse = balance.TROT_PUSHES["lateral"]
-    with TrialRobot(plant_of(Trial(seed), 41000, MASS_RANGE)) as robot:
+    with TrialRobot(plant_of(Trial(seed), 41000, UNTOLD)) as robot:
         assert trots_on(robot, phase, heading_force(side * angle, 1.2 * impulse))
 
 
@@ -93,11 +95,9 @@ def test_a_disturbed_robot_says_in_time_that_it_has_fallen(
         (208, "60.0 to 60.1 deg for a moment, thrown in a jump"),
     ],
 )
-def test_falls_that_were_not_noticed_in_time_are(
-    seed: int, what: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(disturbed, "FIRST_SEED", 64000)
-    values = measured("sensed-disturbed", seed)
+def test_falls_that_were_not_noticed_in_time_are(seed: int, what: str, tmp_path: Path) -> None:
+    name, seed = "sensed-disturbed", 64000 - disturbed.FIRST_SEED + seed
+    values = run_trials("balance", name, [seed], tmp_path)[name][seed].values
     assert values["sensed-disturbed.delay"] <= 0.2, what
     assert values["sensed-disturbed.falls"] > 0.0
 

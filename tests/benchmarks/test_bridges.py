@@ -9,24 +9,15 @@ import pytest
 
 from benchmarks.__main__ import main
 from benchmarks.bridges.command import STUDIES, TESTED
-from benchmarks.study import Study, chosen_studies
+from benchmarks.study import chosen_studies
 from controller.cli.common import ExitCode
 from go2_wbc.errors import CommandError
 
 
-def test_no_name_stands_for_everything() -> None:
-    assert chosen_studies(STUDIES, []) == STUDIES
-
-
-@pytest.mark.parametrize("group", ["ros2", "unitree"])
-def test_a_group_stands_for_its_scenarios(group: str) -> None:
-    expected = tuple(scenario for scenario in STUDIES if scenario.name.startswith(group))
-    assert chosen_studies(STUDIES, [group]) == expected
-
-
-@pytest.mark.parametrize("scenario", STUDIES, ids=lambda scenario: scenario.name)
-def test_a_scenario_stands_for_itself(scenario: Study) -> None:
-    assert chosen_studies(STUDIES, [scenario.name]) == (scenario,)
+@pytest.mark.parametrize("name", ["", "ros2", "unitree", *(study.name for study in STUDIES)])
+def test_a_name_stands_for_a_group_or_a_scenario_and_none_for_everything(name: str) -> None:
+    expected = tuple(study for study in STUDIES if study.name.startswith(name))
+    assert chosen_studies(STUDIES, [name] if name else []) == expected
 
 
 def test_an_unknown_name_is_answered_with_the_valid_ones() -> None:

@@ -5,24 +5,29 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.__main__ import ALIASES, COMMANDS, main
+from benchmarks.__main__ import ALIASES, COMMANDS, GONE, main
 from benchmarks.behaviour import STUDIES
-from benchmarks.command import IDEAL, IMU, on_sensors
 from benchmarks.report import WIDTH
-from benchmarks.study import Measurement, Study, chosen_studies
+from benchmarks.study import IDEAL, IMU, Study, TrialResult, chosen_studies
 from controller.cli.common import ExitCode
 from controller.cli.main import Command
 from controller.sweeps.trials import Trial
 from go2_wbc.errors import CommandError
 from tests.benchmarks.conftest import Only
-from tests.benchmarks.support import fake, fall_on_seed_1, have_a_bug, measure_badly, measure_well
+from tests.benchmarks.support import (
+    Measure,
+    fake,
+    fall_on_seed_1,
+    have_a_bug,
+    measure_badly,
+    measure_well,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -46,12 +51,18 @@ def test_every_benchmark_has_a_help_with_examples(
     assert max(map(len, out.splitlines())) <= WIDTH
 
 
-@pytest.mark.parametrize(("former", "name"), ALIASES.items())
+@pytest.mark.parametrize(("former", "name"), [a for a in ALIASES.items() if a[1] not in GONE])
 def test_a_former_name_still_runs_the_benchmark(
     former: str, name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main([former, "--help"]) == ExitCode.OK
     assert capsys.readouterr().out.startswith(f"usage: python -m benchmarks {name}")
+
+
+def test_what_is_gone_is_told_with_its_place(capsys: pytest.CaptureFixture[str]) -> None:
+    for name, place in GONE.items():
+        assert main([name, "--quick"]) == ExitCode.USAGE
+        assert place in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("argv", [[], ["gallop"], ["behaviour", "--nonsense"], ["--nonsense"]])
@@ -72,7 +83,7 @@ def test_wrong_usage_exits_with_2(argv: list[str], capsys: pytest.CaptureFixture
 def test_the_exit_code_says_whether_every_metric_passes(
     only: Only,
     capsys: pytest.CaptureFixture[str],
-    measure: Callable[[Trial], Measurement],
+    measure: Measure,
     code: ExitCode,
 ) -> None:
     only(fake(measure))
@@ -104,7 +115,7 @@ def test_json_goes_to_stdout_and_to_the_file_alike(
 
 
 def test_an_interrupt_leaves_the_old_report(only: Only, tmp_path: Path) -> None:
-    def interrupt(trial: Trial) -> Measurement:
+    def interrupt(_trial: Trial, _found: TrialResult) -> None:
         raise KeyboardInterrupt
 
     only(fake(interrupt))
@@ -140,11 +151,14 @@ def test_an_unknown_scenario_is_a_usage_error_that_lists_the_valid_ones() -> Non
 
 
 def test_a_trial_on_sensors_is_the_same_trial_with_another_plant() -> None:
-    study = Study("fake", (), lambda trial: Measurement({}, reason=f"{trial}"))
-    assert on_sensors(study, IDEAL) is study
-    sensed = on_sensors(study, IMU)
-    assert sensed.name != study.name  # results of both are kept in one file
-    assert sensed.measure(Trial(7)).reason == str(Trial(7, sensors=IMU))
+    asked: list[Trial] = []
+    study = Study("fake", {}, lambda trial, _: asked.append(trial))
+    assert study.on(IDEAL) is study
+    on_imu, sensed = study.on(IMU), study.sensed("any")
+    assert len({study.name, on_imu.name, sensed.name}) == 3  # results are kept under these
+    for one in (study, on_imu, sensed):
+        one.run(7)
+    assert asked == [Trial(7), Trial(7, sensors=IMU), Trial(7, sensors=IMU)]
     with closing(Trial(3).plant()) as ideal, closing(Trial(3, sensors=IMU).plant()) as plant:
         np.testing.assert_array_equal(ideal.truth().q, plant.truth().q)
         assert plant.read().time == plant.truth().time

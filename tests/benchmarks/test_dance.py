@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import dance
-from benchmarks.dance import STUDIES, TEMPI, measure, song_of
-from controller.sweeps.trials import Trial
+from benchmarks.dance import STUDIES, TEMPI, song_of
 from motions.music import Beats, Song
 
 SECONDS = 7.0
@@ -29,7 +28,7 @@ def test_a_dance_on_beats_that_were_heard_too_late_is_off_the_beat(
 
     monkeypatch.setattr(dance, "SECONDS", SECONDS)
     monkeypatch.setattr(dance, "heard", heard)
-    values = measure(Trial(3), "clicks").values
+    values = STUDIES[0].run(3).values
     assert set(values) == {metric.name for metric in STUDIES[0].metrics}
     assert values["clicks.on_beat"] == share
     assert values["clicks.heard"] == pytest.approx(1000.0 * late, abs=1e-6)

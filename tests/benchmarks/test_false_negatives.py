@@ -75,11 +75,11 @@ def test_every_fourth_motion_is_of_the_library() -> None:
     assert LIBRARY not in others
 
 
-@pytest.mark.parametrize("name", ["false_negatives", "envelopes", "probability"])
+@pytest.mark.parametrize("name", ["false_negatives", "envelopes", "probability --motions 1"])
 def test_a_folder_that_cannot_be_made_is_told(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
-    words = [name, "--rows", str(tmp_path / "file" / "in" / "rows.sqlite")]
+    words = [*name.split(), "--rows", str(tmp_path / "file" / "in" / "rows.sqlite")]
     assert main(words) == ExitCode.USAGE
     assert "cannot make the folder" in capsys.readouterr().err

@@ -10,18 +10,16 @@ import pytest
 
 from benchmarks import feasibility
 from benchmarks.__main__ import main
-from benchmarks.command import IDEAL, IMU, on_sensors
 from benchmarks.feasibility import (
     EXAM,
     OUTCOMES,
-    PLAN,
     REFUSED,
-    ask,
     exam,
     judged,
     judged_dynamic,
+    study_of,
 )
-from benchmarks.study import Measurement, run_tasks
+from benchmarks.study import IDEAL, IMU, TrialResult
 from benchmarks.validation_set.drawing import TEST, TRAIN
 from benchmarks.validation_set.physics import BORDER, PLAYS
 from benchmarks.validation_set.questions import draw_name, draws
@@ -41,43 +39,37 @@ COUNT = 12
 
 def case(refused: bool, failed: bool, stratum: str = "border") -> Case:
     refusal = ("friction",) if refused else ()
-    return Case("a 0 1", "a", TEST, stratum, False, refusal, BAD if failed else FINE)
+    return Case("a 0 1", TEST, stratum, False, refusal, BAD if failed else FINE)
 
 
-def test_the_bars_are_those_of_the_test_half() -> None:
-    right = [*(30 * [case(True, True)]), *(30 * [case(False, False)])]
-    assert judged(right, len(right))[0]
-    train = [replace(case(True, False), half=TRAIN)]
-    assert judged([*right, *train], len(right) + 1)[0]
+RIGHT = [*(50 * [case(True, True)]), *(50 * [case(False, False)])]
 
 
-@pytest.mark.parametrize("mistake", [(True, False), (False, True)])
-def test_too_many_mistakes_of_either_kind_are_not_ok(mistake: tuple[bool, bool]) -> None:
-    right = [*(30 * [case(True, True)]), *(30 * [case(False, False)])]
-    assert judged([*right, case(*mistake)], 61)[0]
-    assert not judged([*right, *(2 * [case(*mistake)])], 62)[0]
+@pytest.mark.parametrize(
+    ("cases", "lost", "is_ok", "is_ok_dynamic"),
+    [
+        (RIGHT, 0, True, True),
+        (RIGHT, 1, False, False),
+        (RIGHT[:99], 0, True, False),  # too few
+        ([*RIGHT, replace(case(True, False), half=TRAIN)], 0, True, True),
+        ([*RIGHT, case(True, False)], 0, True, True),
+        ([*RIGHT, *(4 * [case(True, False)])], 0, False, False),
+        ([*RIGHT, *(4 * [case(False, True)])], 0, False, False),
+    ],
+)
+def test_the_bars_are_those_of_the_test_half_and_no_motion_is_lost(
+    cases: list[Case], lost: int, is_ok: bool, is_ok_dynamic: bool
+) -> None:
+    said_ok, said = judged(cases, len(cases) + lost)
+    assert said_ok is is_ok
+    assert f"{lost} without a result" in said
+    assert judged_dynamic(cases, len(cases) + lost)[0] is is_ok_dynamic
 
 
-def test_a_motion_without_a_result_is_not_ok() -> None:
-    right = [*(30 * [case(True, True)]), *(30 * [case(False, False)])]
-    is_ok, said = judged(right, len(right) + 1)
-    assert not is_ok
-    assert "1 without a result" in said
-
-
-def test_enough_dynamic_motions_must_be_foretold() -> None:
-    right = [*(50 * [case(True, True)]), *(50 * [case(False, False)])]
-    assert judged_dynamic(right, 100)[0]
-    assert not judged_dynamic(right, 101)[0], "one is lost"
-    assert not judged_dynamic(right[:99], 99)[0], "too few"
-    assert not judged_dynamic([*right, *(4 * [case(True, False)])], 104)[0]
-
-
-def fake(trial: Trial) -> Measurement:
-    failed = float(trial.seed % 2)
-    values = {REFUSED.name: failed, **{metric.name: failed for metric in OUTCOMES.values()}}
-    reasons = dict.fromkeys(values, "friction; fell") if failed else {}
-    return Measurement(values, notes={**reasons, PLAN: f"{trial.seed}"})
+def fake(trial: Trial, found: TrialResult, *_: object, **__: object) -> None:
+    reasons = (REFUSED, *OUTCOMES)
+    found.values = dict.fromkeys(reasons, float(trial.seed % 2))
+    found.notes = dict.fromkeys(reasons, "friction; fell" if trial.seed % 2 else "")
 
 
 def test_the_command_reports_and_writes_scores_and_no_motion_of_the_test_half(
@@ -86,8 +78,7 @@ def test_the_command_reports_and_writes_scores_and_no_motion_of_the_test_half(
     tmp_path: Path,
     results_folder: Path,
 ) -> None:
-    fakes = {of: replace(one, measure=fake) for of, one in feasibility.STORED.items()}
-    monkeypatch.setattr(feasibility, "STORED", fakes)
+    monkeypatch.setattr(feasibility, "ask", fake)
     file = tmp_path / "scores.json"
     arguments = ["feasibility", "--motions", str(COUNT), "--jobs", "1", "--json"]
     assert main([*arguments, "--out", str(file)]) == ExitCode.OK
@@ -109,25 +100,11 @@ def test_the_command_reports_and_writes_scores_and_no_motion_of_the_test_half(
 def test_dynamic_motions_of_one_half_are_asked_by_themselves(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], results_folder: Path
 ) -> None:
-    fakes = {of: replace(one, measure=fake) for of, one in feasibility.STORED.items()}
-    monkeypatch.setattr(feasibility, "STORED", fakes)
+    monkeypatch.setattr(feasibility, "ask", fake)
     arguments = ["feasibility", "--rows", "dynamic", "--half", "test", "--jobs", "1", "--json"]
     main([*arguments, "--motions", str(COUNT)])
     found = json.loads(capsys.readouterr().out)["scores"]
     assert (found["test dynamic"]["n"], found["train strict"]["n"]) == (COUNT, 0)
-
-
-def test_what_is_remade_is_stored_beside_what_was_stored(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], results_folder: Path
-) -> None:
-    kept: dict[str, MotionFailures] = {}
-    fakes = {of: replace(one, measure=fake) for of, one in feasibility.REMADE.items()}
-    monkeypatch.setattr(feasibility, "REMADE", fakes)
-    monkeypatch.setattr(feasibility, "write_outcomes", kept.update)
-    monkeypatch.setattr(feasibility, "_known", lambda: {"old": FINE, "1": FINE})
-    main(["feasibility", "--motions", "2", "--jobs", "1", "--remake"])
-    assert kept == {"old": FINE, "0": FINE, "1": MotionFailures(*(4 * [("friction", "fell")]))}
-    assert "2 motions" in capsys.readouterr().out
 
 
 def test_only_borders_that_are_not_stored_are_bisected(
@@ -148,36 +125,14 @@ def test_only_borders_that_are_not_stored_are_bisected(
     assert f"{len(names)} of {len(names)} borders, 1 beyond" in capsys.readouterr().out
 
 
-def found_border(trial: Trial) -> Measurement:
+def found_border(trial: Trial, found: TrialResult) -> None:
     """Every second draw has a border."""
-    values = {PLAYS.name: 3.0} if trial.seed % 2 else {PLAYS.name: 3.0, BORDER.name: 0.25}
-    return Measurement(values)
+    found.values = {PLAYS: 3.0} if trial.seed % 2 else {PLAYS: 3.0, BORDER: 0.25}
 
 
-def test_physics_is_asked_only_where_no_outcome_is_stored(
+def test_a_motion_is_played_with_the_sensors_that_are_asked_for(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    played: list[int] = []
-
-    def play(_plan: object, _model: RobotModel, seed: int, _sensors: str) -> object:
-        played.append(seed)
-        return object()
-
-    monkeypatch.setattr(feasibility, "play", play)
-    monkeypatch.setattr(feasibility, "failures_of", lambda _run, _plan: BAD)
-    monkeypatch.setattr(feasibility, "_known", dict[str, object])
-    first = ask(Trial(0), of=EXAM, is_played=False)
-    assert len(played) == 1
-    assert first.notes[f"feasibility.{STRICT}"] == "fell"
-    monkeypatch.setattr(feasibility, "_known", lambda: {first.notes[PLAN]: FINE})
-    stored = ask(Trial(0), of=EXAM, is_played=False)
-    assert len(played) == 1
-    assert stored.values[f"feasibility.{STRICT}"] == 0.0
-    ask(Trial(0), of=EXAM, is_played=True)
-    assert len(played) == 2
-
-
-def test_on_sensors_all_is_played_and_nothing_is_stored(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
 
     def play(_plan: object, _model: RobotModel, _seed: int, sensors: str) -> object:
@@ -186,10 +141,8 @@ def test_on_sensors_all_is_played_and_nothing_is_stored(monkeypatch: pytest.Monk
 
     monkeypatch.setattr(feasibility, "play", play)
     monkeypatch.setattr(feasibility, "failures_of", lambda _run, _plan: BAD)
-    on_sensors(feasibility.REMADE[EXAM], IMU).measure(Trial(0))
-    feasibility.REMADE[EXAM].measure(Trial(0))
-    assert asked == [IMU, IDEAL]
-    assert main(["feasibility", "--remake", "--sensors", "imu"]) != ExitCode.OK
+    for sensors in (IMU, IDEAL):
+        assert study_of(EXAM).on(sensors).run(0).notes[STRICT] == "fell"
     assert asked == [IMU, IDEAL]
 
 
@@ -197,5 +150,5 @@ def test_a_robot_that_does_not_get_ready_is_a_lost_run_and_not_a_bug(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(GO2Controller, "stand", lambda _go2: False)
-    ((_, _, measured),) = run_tasks([(feasibility.REMADE[EXAM], 0)], jobs=0)
-    assert (measured.values, measured.reason) == ({}, "lying, nothing asked yet")
+    found = study_of(EXAM).run(0)
+    assert (found.values, found.reason) == ({}, "lying, nothing asked yet")

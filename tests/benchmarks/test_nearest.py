@@ -10,8 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from benchmarks import nearest
-from benchmarks.nearest import KINDS, METRICS, measure, off_written, refused_motion
-from controller.sweeps.trials import Trial
+from benchmarks.nearest import KINDS, STUDIES, off_written, refused_motion
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
@@ -69,8 +68,8 @@ def test_a_sample_is_found_played_and_as_far_off_as_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(nearest, "FIRST_SEED", SAMPLE)
-    measured = measure(Trial(0))
-    assert set(measured.values) == {metric.name for metric in METRICS}
+    measured = STUDIES[0].run(0)
+    assert set(measured.values) == {metric.name for metric in STUDIES[0].metrics}
     assert not measured.failures
     assert measured.values["nearest.found"] == 100.0
     assert measured.values["nearest.done"] == 1.0
@@ -83,15 +82,15 @@ def test_a_run_that_is_not_as_reported_is_a_failure_whatever_the_mean(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(nearest, "FIRST_SEED", SAMPLE)
-    monkeypatch.setattr(nearest, "play", lambda *_: {"nearest.measured": 50.0})
-    assert "mm" in measure(Trial(0)).failures["nearest.as_reported"]
+    monkeypatch.setattr(nearest, "play", lambda *_: {"measured": 50.0})
+    assert "mm" in STUDIES[0].run(0).failures["nearest.as_reported"]
 
 
 def test_only_what_was_found_is_to_be_done(monkeypatch: pytest.MonkeyPatch) -> None:
     refused = Timeline().body(z=-0.2, over=0.05).home(over=0.05)
     monkeypatch.setattr(nearest, "refused_motion", lambda *_: SimpleNamespace(nearest=refused))
-    measured = measure(Trial(0))
+    measured = STUDIES[0].run(0)
     assert measured.values == {"nearest.found": 0.0}
-    asked = [metric.name for metric in METRICS if metric.name not in measured.not_asked]
-    assert asked == ["nearest.found"]
+    asked = {metric.name for metric in STUDIES[0].metrics} - measured.not_asked.keys()
+    assert asked == {"nearest.found"}
     assert measured.failure("nearest.found") is None

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.qp_infeasibility import calf_distance, watch
-from benchmarks.study import Measurement
+from benchmarks.study import TrialResult
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.errors import QpInfeasible
 from go2_wbc.robot.model import RobotModel
@@ -17,9 +17,10 @@ from tests.go2_wbc.plant.helpers import empty_recording
 
 
 def measured(robot: TrialRobot, course: Iterator[float]) -> dict[str, float]:
+    found = TrialResult()
     with robot:
-        measurement: Measurement = watch("row", robot, course)
-    return {name.removeprefix("row."): value for name, value in measurement.values.items()}
+        watch(robot, course, found)
+    return found.values
 
 
 def test_a_quiet_trot_counts_nothing() -> None:

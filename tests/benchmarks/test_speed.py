@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks import speed, speed_solves, speed_ticks
 from benchmarks.speed_placo import BarePlaco
-from benchmarks.study import Measurement, Metric
+from benchmarks.study import chosen_studies
 from controller.sweeps.trials import Trial
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.config import WbcConfig
@@ -33,14 +33,17 @@ def few_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(module, "recorded_ticks", recorded_ticks)
 
 
-def assert_complete(measured: Measurement, metrics: tuple[Metric, ...]) -> None:
-    assert set(measured.values) == {metric.name for metric in metrics}
+def measured(name: str) -> dict[str, float]:
+    """One trial of a study, which gives every value that it says."""
+    (study,) = chosen_studies(speed.STUDIES, [name])
+    found = study.run(0)
+    assert set(found.values) == {metric.name for metric in study.metrics}, found.reason
+    assert min(found.values.values()) >= 0.0
+    return found.values
 
 
 def test_both_solve_the_same_ticks_in_every_contact_mode() -> None:
-    measured = speed_solves.measure_solves(Trial(0))
-    assert_complete(measured, speed_solves.METRICS)
-    assert min(measured.values.values()) > 0.0
+    assert min(measured("solves").values()) > 0.0
 
 
 def test_placo_is_asked_for_the_same_torques(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -59,58 +62,41 @@ def test_a_reference_is_packed_again_for_every_measurement_if_it_came_unpacked()
 
 
 def test_a_tick_is_timed_in_every_mode() -> None:
-    measured = speed_ticks.measure_ticks(Trial(0))
-    assert_complete(measured, speed_ticks.TICK_METRICS)
-    assert min(measured.values.values()) > 0.0
-
-
-def test_the_parts_make_up_a_tick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(speed_ticks, "PARTS_TIME", 0.1)
-    measured = speed_ticks.measure_parts(Trial(0))
-    assert_complete(measured, speed_ticks.PART_METRICS)
-    assert min(measured.values.values()) > 0.0
+    assert min(measured("ticks").values()) > 0.0
 
 
 def test_the_worst_tick_of_random_commands_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(speed_ticks, "COMMAND_TIME", 2.0)
     monkeypatch.setattr(speed_ticks, "TRACED_TICKS", 20)
-    measured = speed_ticks.measure_commands(Trial(0))
-    assert_complete(measured, speed_ticks.COMMAND_METRICS)
-    assert measured.values["commands.worst"] >= measured.values["commands.p99"] >= 1.0
-    assert measured.values["commands.peak"] > 0.0
+    values = measured("commands")
+    assert values["commands.worst"] >= values["commands.p99"] >= 1.0
+    assert values["commands.peak"] > 0.0
 
 
 def test_ticks_on_sensors_with_planned_forces_are_timed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(speed_ticks, "ESTIMATED_TIME", 0.5)
     monkeypatch.setattr(speed_ticks, "REPEATS", 2)
-    measured = speed_ticks.measure_estimated(Trial(0))
-    assert_complete(measured, speed_ticks.ESTIMATED_METRICS)
-    assert measured.values["estimated.worst"] >= measured.values["estimated.p99"] >= 1.0
+    values = measured("estimated")
+    assert values["estimated.worst"] >= values["estimated.p99"] >= 1.0
 
 
 def test_a_start_is_measured_in_a_process_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(speed, "PROCESSES", 1)
     starts = {name: (what, "sum(range(10**6))", 1.0) for name, (what, _, _) in speed.STARTS.items()}
     monkeypatch.setattr(speed, "STARTS", starts)
-    measured = speed.measure_startup(Trial(0))
-    assert_complete(measured, speed.START_METRICS)
-    assert min(measured.values.values()) > 0.0
+    assert min(measured("startup").values()) > 0.0
 
 
 def test_late_ticks_are_counted_at_the_pace_of_the_wall_clock(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(speed_ticks, "REAL_TIME", 0.2)
-    measured = speed_ticks.measure_realtime(Trial(0))
-    assert_complete(measured, speed_ticks.REALTIME_METRICS)
-    assert measured.values["realtime.ticks"] > 0.0
+    assert measured("realtime")["realtime.ticks"] > 0.0
 
 
 def test_checking_and_compiling_are_timed_for_every_motion(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(speed, "ROUNDS", 1)
-    measured = speed.measure_checks(Trial(0))
-    assert set(measured.values) == {metric.name for metric in speed.CHECK_METRICS}
-    assert min(measured.values.values()) > 0.0
+    assert min(measured("checks").values()) > 0.0
 
 
 @pytest.mark.parametrize("seconds", speed.LENGTHS)

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.store import Store, file_of, settings_header
-from benchmarks.study import Measurement, Metric, Study
+from benchmarks.store import file_of, opened, settings_header
+from benchmarks.study import Study, TrialResult
 from controller.cli.common import ExitCode
 from controller.sweeps.run import read_sweep
 from controller.sweeps.trials import Trial
@@ -18,9 +18,9 @@ from go2_wbc.errors import ConfigError
 from tests.benchmarks.conftest import Only
 from tests.benchmarks.support import fake, measure_well
 
-TROT = Study("trot", (Metric("a", "", "", "", None), Metric("b", "", "", "", None)), measure_well)
-FIRST = Measurement({"a": 0.1 + 0.2, "b": math.inf}, {"b": "it fell"}, "said no", {"a": "x"})
-SECOND = Measurement({"a": math.nan, "b": -0.0}, not_asked={"a": "no plan"})
+TROT = Study("trot", {"": (("a", "", ""), ("b", "", ""))}, measure_well, prefix="")
+FIRST = TrialResult({"a": 0.1 + 0.2, "b": math.inf}, {"b": "it fell"}, "said no", {"a": "x"})
+SECOND = TrialResult({"a": math.nan, "b": -0.0}, not_asked={"a": "no plan"})
 
 
 class Interrupted:
@@ -29,17 +29,17 @@ class Interrupted:
     def __init__(self, before: int) -> None:
         self.before, self.seeds = before, list[int]()
 
-    def __call__(self, trial: Trial) -> Measurement:
+    def __call__(self, trial: Trial, found: TrialResult) -> None:
         if trial.seed == self.before:
             raise KeyboardInterrupt
         self.seeds.append(trial.seed)
-        return measure_well(trial)
+        measure_well(trial, found)
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """Two trials of a run that has ended."""
-    with Store(tmp_path, [TROT], resume=False) as store:
+    with opened(tmp_path, [TROT], resume=False) as store:
         store.add(TROT, 0, FIRST)
         store.add(TROT, 7, SECOND)
     return tmp_path
@@ -65,26 +65,20 @@ def test_an_interrupted_run_goes_on_with_what_is_left(
     assert [path.name for path in results_folder.rglob("*.sqlite")] == ["fake.sqlite"]
 
 
-def test_more_seeds_than_before_only_add_to_it(only: Only) -> None:
+@pytest.mark.parametrize(("words", "seeds"), [(("5", "--resume"), [2, 3, 4]), (("2",), [0, 1])])
+def test_more_seeds_only_add_to_what_is_there_and_without_resume_all_is_measured_again(
+    only: Only, words: tuple[str, ...], seeds: list[int]
+) -> None:
     later = Interrupted(99)
     only(fake())
     main(["behaviour", "--seeds", "2"])
     only(fake(later))
-    assert main(["behaviour", "--seeds", "5", "--resume"]) == ExitCode.OK
-    assert later.seeds == [2, 3, 4]
-
-
-def test_without_resume_everything_is_measured_again(only: Only) -> None:
-    again = Interrupted(99)
-    only(fake())
-    main(["behaviour", "--seeds", "2"])
-    only(fake(again))
-    main(["behaviour", "--seeds", "2"])
-    assert again.seeds == [0, 1]
+    assert main(["behaviour", "--seeds", *words]) == ExitCode.OK
+    assert later.seeds == seeds
 
 
 def test_trials_come_back_to_the_last_bit(folder: Path) -> None:
-    with Store(folder, [TROT], resume=True) as store:
+    with opened(folder, [TROT], resume=True) as store:
         found = store.finished
     assert set(found) == {("trot", 0), ("trot", 7)}
     assert found["trot", 0] == FIRST
@@ -105,8 +99,11 @@ def test_trials_under_other_settings_are_refused_with_what_differs(
 ) -> None:
     other = {**settings_header(), name: "another"}
     monkeypatch.setattr("benchmarks.store.settings_header", lambda: other)
-    with pytest.raises(ConfigError, match=rf"{name} .*now another.*without --resume"):
-        Store(folder, [TROT], resume=True)
+    with (
+        pytest.raises(ConfigError, match=rf"{name} .*now another.*without --resume"),
+        opened(folder, [TROT], resume=True),
+    ):
+        pass
 
 
 def test_other_settings_are_a_usage_error_that_keeps_the_trials(
@@ -128,8 +125,11 @@ def test_other_settings_are_a_usage_error_that_keeps_the_trials(
 def test_a_file_of_something_else_is_neither_read_nor_removed(tmp_path: Path) -> None:
     file_of(tmp_path, TROT).write_text("notes")
     for resume in (True, False):
-        with pytest.raises(ConfigError, match="no database"):
-            Store(tmp_path, [TROT], resume=resume)
+        with (
+            pytest.raises(ConfigError, match="no database"),
+            opened(tmp_path, [TROT], resume=resume),
+        ):
+            pass
     assert file_of(tmp_path, TROT).read_text() == "notes"
 
 

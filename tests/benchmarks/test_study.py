@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from benchmarks.command import tasks_of
 from benchmarks.report import summarise
-from benchmarks.study import Measurement, Results, Study, run_tasks
+from benchmarks.study import Results, Study, TrialResult, run_tasks, tasks_of
 from controller.sweeps.trials import Trial, TrialFailed
 from tests.benchmarks.support import (
-    SPEED,
+    TABLE,
+    Measure,
     break_the_plant,
     die_on_seed_1,
     fake,
@@ -20,25 +22,38 @@ from tests.benchmarks.support import (
 
 def results_of(*scenarios: Study, seeds: int, jobs: int = 0) -> Results:
     results: Results = {scenario.name: {} for scenario in scenarios}
-    for scenario, seed, measurement in run_tasks(tasks_of(scenarios, seeds), jobs):
+    tasks = tasks_of(scenarios, seeds)
+    here = ((study, seed, study.run(seed)) for study, seed in tasks)
+    for scenario, seed, measurement in run_tasks(tasks, jobs) if jobs else here:
         assert seed not in results[scenario.name]
         results[scenario.name][seed] = measurement
     return results
 
 
-def test_an_error_of_the_project_is_a_failed_trial_with_its_reason() -> None:
-    results = results_of(fake(break_the_plant), seeds=1)
-    report = summarise([fake()], results)
-    assert report.rows[0].failures == {0: "PlantError: physics failed"}
-    assert not report.ok
-
-
-def fall(trial: Trial) -> Measurement:
+def fall(_trial: Trial, found: TrialResult) -> None:
+    found.values["speed"] = 2.0
     raise TrialFailed("fell at t=1.00 s")
 
 
-def test_a_robot_that_fails_is_a_failed_trial_in_its_own_words() -> None:
-    assert results_of(fake(fall), seeds=1)["fake"][0].reason == "fell at t=1.00 s"
+@pytest.mark.parametrize(
+    ("measure", "reason"),
+    [(break_the_plant, "PlantError: physics failed"), (fall, "fell at t=1.00 s")],
+)
+def test_a_robot_that_fails_is_a_failed_trial_with_what_was_found_until_then(
+    measure: Measure, reason: str
+) -> None:
+    results = results_of(fake(measure), seeds=1)
+    report = summarise([fake()], results)
+    assert report.rows[1].failures == {0: reason}
+    assert not report.ok
+    assert results["fake"][0].values == ({"fake.speed": 2.0} if measure is fall else {})
+
+
+@pytest.mark.parametrize(("measure", "done"), [(measure_badly, 1.0), (fall, 0.0)])
+def test_a_trial_is_done_that_comes_to_its_end(measure: Measure, done: float) -> None:
+    result = replace(fake(measure), done="done").run(0)
+    assert result.values["fake.done"] == done
+    assert ("fake.done" in result.failures) is not bool(done)
 
 
 def test_a_bug_is_raised_and_not_counted() -> None:
@@ -47,7 +62,7 @@ def test_a_bug_is_raised_and_not_counted() -> None:
 
 
 def test_every_seed_of_every_scenario_is_run_once() -> None:
-    more = Study("more", (SPEED,), measure_badly, seed_factor=2)
+    more = Study("more", TABLE, measure_badly, seed_factor=2)
     results = results_of(fake(), more, seeds=2)
     assert {name: sorted(trials) for name, trials in results.items()} == {
         "fake": [0, 1],

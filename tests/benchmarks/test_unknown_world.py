@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
 from benchmarks import unknown_world
-from benchmarks.study import IMU, Measurement
+from benchmarks.study import IDEAL, IMU, TrialResult
 from benchmarks.unknown_world import (
     CALLS,
     ROBOTS,
@@ -17,43 +18,49 @@ from benchmarks.unknown_world import (
     measure_robot,
     measure_world,
 )
-from controller.sweeps.trials import Trial
 from go2_wbc.plant.mujoco.model import JointDynamics
-from go2_wbc.plant.terrain import Boxes, Stairs
+from go2_wbc.plant.terrain import Stairs
 
 TUNING_SEED = 7500
 QUICK = Unknown("any", "level ground", time=0.6)
 
 
-def measured(world: Unknown) -> Measurement:
+def measured(world: Unknown) -> TrialResult:
     """Of one trial of the seeds for tuning."""
-    return measure_world(Trial(0), world, first_seed=0)
+    measure = partial(measure_world, unknown=world, first_seed=0)
+    return replace(world.study, measure=measure).run(0)
+
+
+def asked(robot: Robot, sensors: str = IDEAL) -> TrialResult:
+    """The same of a robot."""
+    measure = partial(measure_robot, robot=robot, first_seed=TUNING_SEED)
+    return replace(robot.study, measure=measure, sensors=sensors).run(0)
 
 
 def test_a_run_is_done_by_a_robot_that_walks_and_stands_again() -> None:
     done = measured(QUICK)
     assert done.values["any.done"] == 1.0
-    assert set(done.values) == {metric.name for metric in QUICK.metrics}
+    assert set(done.values) == {metric.name for metric in QUICK.study.metrics}
 
 
 def test_a_robot_before_a_wall_has_not_done_it() -> None:
-    wall = replace(QUICK, terrain=Stairs(height=0.4, count=1, start=0.5), time=1.5)
+    wall = replace(QUICK, settings={"terrain": Stairs(height=0.4, count=1, start=0.5)}, time=1.5)
     failed = measured(wall)
     assert failed.values["any.done"] == 0.0
-    assert failed.reason is not None
+    assert failed.failures == {"any.done": failed.reason}
 
 
 def test_a_payload_is_judged_by_the_height_and_tilt_of_the_trunk() -> None:
-    aside = replace(QUICK, payload=1.0, payload_place=(0.0, 0.1, 0.1))
+    aside = replace(QUICK, settings={"payload": 1.0, "payload_place": (0.0, 0.1, 0.1)})
     done = measured(aside)
-    assert set(done.values) == {metric.name for metric in aside.metrics}
+    assert set(done.values) == {metric.name for metric in aside.study.metrics}
     assert done.values["any.tilt"] > 0.05
 
 
 def test_every_trial_has_a_plant_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = []
     monkeypatch.setattr(unknown_world, "MujocoPlant", lambda **settings: seen.append(settings))
-    boxes = next(world for world in WORLDS if isinstance(world.terrain, Boxes))
+    boxes = next(world for world in WORLDS if world.name == "boxes")
     for seed in (1, 2):
         boxes.plant(seed)
     first, second = seen
@@ -78,15 +85,15 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("short")
 def test_a_robot_that_does_it_all_has_every_value() -> None:
     robot = Robot("any", "as the controller knows it", JointDynamics())
-    measured = measure_robot(Trial(0, sensors=IMU), robot, TUNING_SEED)
-    assert measured.reason == ""
-    assert set(measured.values) == {metric.name for metric in robot.metrics}
-    assert all(measured.values[f"any.{call}"] == 1.0 for call in CALLS)
+    found = asked(robot, IMU)
+    assert found.reason == ""
+    assert set(found.values) == {metric.name for metric in robot.study.metrics}
+    assert all(found.values[f"any.{call}"] == 1.0 for call in CALLS)
 
 
 @pytest.mark.usefixtures("short")
 def test_what_comes_after_a_call_that_fails_is_not_done() -> None:
     stuck = Robot("any", "joints that hardly move", JointDynamics(friction_loss=(12.0, 12.0, 12.0)))
-    measured = measure_robot(Trial(0), stuck, TUNING_SEED)
-    assert measured.reason != ""
-    assert measured.values["any.high-five"] == 0.0
+    found = asked(stuck)
+    assert found.reason != ""
+    assert found.values["any.high-five"] == 0.0

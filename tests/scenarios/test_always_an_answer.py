@@ -6,16 +6,16 @@ A sample of ``python -m benchmarks qp_infeasibility``, one seed of each row.
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 
-from benchmarks.locomotion import MASS_RANGE
-from benchmarks.qp_infeasibility import STUDIES
-from benchmarks.robots import PUSH_TIME, heading_force, plant_of
+from benchmarks.robots import PUSH_TIME, UNTOLD, heading_force, plant_of
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.planning.locomotion import LocomotionConfig
 from go2_wbc.planning.mpc import MpcConfig
+from tests.unchecked import run_trials
 
 SAMPLES = [("boxes", 19), ("pushes", 17), ("stops", 8)]
 """Study and seed."""
@@ -27,9 +27,10 @@ GRAVE = 0.1  # [%] of the ticks
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "seed"), SAMPLES)
-def test_contradictions_are_answered_and_never_damp_an_upright_robot(name: str, seed: int) -> None:
-    scenario = next(scenario for scenario in STUDIES if scenario.name == name)
-    values = scenario.measure(Trial(seed)).values
+def test_contradictions_are_answered_and_never_damp_an_upright_robot(
+    name: str, seed: int, tmp_path: Path
+) -> None:
+    values = run_trials("qp_infeasibility", name, [seed], tmp_path)[name][seed].values
     assert values[f"{name}.failures"] == 0.0
     assert values[f"{name}.damped"] == 0.0
     assert values[f"{name}.unreported"] == values[f"{name}.falls"] == 0.0
@@ -47,7 +48,7 @@ def test_a_hip_at_its_stop_for_a_moment_does_not_damp_a_robot_that_is_pushed(
     The attitude keeps its weight, or no hip comes to its stop.
     """
     config = Config(locomotion=LocomotionConfig(mpc=MpcConfig(throw_speed=1e9)))
-    with TrialRobot(plant_of(Trial(seed), 7100, MASS_RANGE, "imu"), config) as robot:
+    with TrialRobot(plant_of(Trial(seed, sensors="imu"), 7100, UNTOLD), config) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         robot.go2.move(0.5)

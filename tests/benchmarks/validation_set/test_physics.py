@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from benchmarks.validation_set import physics
-from benchmarks.validation_set.physics import BORDER, NEAR, measure_border, play
-from benchmarks.validation_set.questions import FAMILIES, Question, draws
+from benchmarks.validation_set.physics import (
+    BORDER,
+    BORDERS,
+    NEAR,
+    PLAYS,
+    play,
+    read_borders,
+    write_borders,
+)
+from benchmarks.validation_set.questions import FAMILIES, Question, draw_name, draws, questions
 from controller.motion_failures import UNPLANNED, MotionFailures, failures_of
 from controller.motion_measurement import MotionMeasurement
-from controller.sweeps.trials import Trial
+from go2_wbc.errors import ConfigError
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline
@@ -122,9 +132,9 @@ def test_a_border_is_found_between_what_is_done_and_what_fails(
         return question.amplitude < 0.83
 
     monkeypatch.setattr(physics, "is_done", is_done)
-    found = measure_border(Trial(0))
-    assert found.values[BORDER.name] == pytest.approx(0.83, rel=NEAR - 1.0)
-    assert found.values["feasibility.plays"] == len(asked)
+    found = BORDERS.run(0)
+    assert found.values[BORDER] == pytest.approx(0.83, rel=NEAR - 1.0)
+    assert found.values[PLAYS] == len(asked)
 
 
 @pytest.mark.parametrize(("answer", "word"), [(True, "highest"), (False, "lowest")])
@@ -132,8 +142,8 @@ def test_no_border_is_made_up_where_physics_does_not_change_its_mind(
     monkeypatch: pytest.MonkeyPatch, answer: bool, word: str
 ) -> None:
     monkeypatch.setattr(physics, "is_done", lambda _question: answer)
-    found = measure_border(Trial(0))
-    assert BORDER.name not in found.values
+    found = BORDERS.run(0)
+    assert BORDER not in found.values
     assert word in found.reason
 
 
@@ -148,7 +158,42 @@ def test_a_border_is_searched_for_its_own_draw_from_amplitude_1(
 
     monkeypatch.setattr(physics, "is_done", is_done)
     row = next(row for row, (_, number) in enumerate(draws()) if number == 1)
-    measure_border(Trial(row))
+    BORDERS.run(row)
     assert {(q.family, q.draw) for q in asked} == {draws()[row]}
     assert asked[0].amplitude == 1.0
     assert min(q.amplitude for q in asked) >= draws()[row][0].low
+
+
+# --- the file of borders --------------------------------------------------------------------------
+
+
+KEPT: dict[str, float | None] = {"crouch 0": 1.25, "rise 0": None}
+
+
+def test_borders_are_read_as_they_were_written(tmp_path: Path) -> None:
+    file = tmp_path / "borders.json"
+    write_borders(KEPT, file)
+    assert read_borders(file) == KEPT
+
+
+def test_a_damaged_file_is_an_error_that_says_what_to_do(tmp_path: Path) -> None:
+    file = tmp_path / "borders.json"
+    file.write_text("{")
+    with pytest.raises(ConfigError, match="--borders"):
+        read_borders(file)
+    with pytest.raises(ConfigError, match="cannot be read"):
+        read_borders(tmp_path / "none.json")
+
+
+def test_the_borders_that_are_kept_are_those_of_the_exam() -> None:
+    kept = read_borders()
+    assert set(kept) <= {draw_name(family, number) for family, number in draws()}
+    for question in questions(kept):
+        assert question.amplitude > 0.0
+
+
+def test_a_file_is_one_entry_a_line(tmp_path: Path) -> None:
+    file = tmp_path / "borders.json"
+    write_borders(KEPT, file)
+    assert len(file.read_text().splitlines()) == 2 + len(KEPT)
+    assert json.loads(file.read_text()) == KEPT

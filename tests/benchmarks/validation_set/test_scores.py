@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.validation_set.drawing import TEST, TRAIN
-from benchmarks.validation_set.scores import Case, Score, Share, noticed, render, scores, wrong_ones
+from benchmarks.validation_set.scores import Case, Score, Share, render, scores, wrong_ones
 from controller.motion_failures import FELL, LENIENT, NOT_DONE, STRICT, UNPLANNED, MotionFailures
 
 
@@ -15,7 +15,7 @@ def case(refused: bool, failed: bool, *, half: str = TEST, why: str = "slip 12 m
     harm = (why,) if failed else ()
     outcome = MotionFailures(harm, harm, (), ("fell",) if why == "fell" else ())
     refusal = ("friction",) if refused else ()
-    return Case("name 0 1.0", "name", half, "easy", False, refusal, outcome)
+    return Case("name 0 1.0", half, "easy", False, refusal, outcome)
 
 
 CASES = [
@@ -28,7 +28,7 @@ CASES = [
 
 def test_refusals_and_passes_are_judged_in_both_directions() -> None:
     score = Score.of(CASES)
-    assert [(share.right, share.n) for share in score.shares] == [(3, 4), (3, 5), (4, 6), (4, 5)]
+    assert [(share.right, share.n) for share in score] == [(3, 4), (3, 5), (4, 6), (4, 5)]
     assert score.least == pytest.approx(0.6)
     assert score.n == len(CASES)
 
@@ -59,16 +59,8 @@ def test_the_table_has_both_halves_and_fits_a_terminal() -> None:
 
 def test_motions_without_a_plan_are_counted_apart() -> None:
     cases = [
-        Case(
-            "a",
-            "a",
-            TEST,
-            "easy",
-            True,
-            ("dynamic plan",),
-            MotionFailures((UNPLANNED,), (), (), ()),
-        ),
-        Case("b", "b", TEST, "easy", True, (), MotionFailures((), (), (), ())),
+        Case("a", TEST, "easy", True, ("dynamic plan",), MotionFailures((UNPLANNED,), (), (), ())),
+        Case("b", TEST, "easy", True, (), MotionFailures((), (), (), ())),
     ]
     found = scores(cases)
     assert (found["test dynamic"].n, found["test solved"].n) == (2, 1)
@@ -77,7 +69,7 @@ def test_motions_without_a_plan_are_counted_apart() -> None:
 def test_it_is_told_how_often_play_noticed_what_went_wrong() -> None:
     told = replace(case(False, True), outcome=MotionFailures((NOT_DONE, "fell"), (), (), ()))
     unplanned = replace(case(True, True), outcome=MotionFailures((UNPLANNED,), (), (), ()))
-    said = noticed([told, case(True, True), case(False, False), unplanned])
+    said = render([told, case(True, True), case(False, False), unplanned]).splitlines()[-1]
     assert said.startswith("Of 2 motions that were played and went wrong")
     assert said.endswith("says so of 1.")
 

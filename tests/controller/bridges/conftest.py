@@ -8,10 +8,10 @@ from contextlib import closing
 
 import pytest
 
-from benchmarks.bridges.processes import Process
-from benchmarks.bridges.ros2_processes import joined, serving
+from tests.controller.bridges.processes import Process
 from tests.controller.bridges.ros2_graph import HAS_ROS2, isolate
 from tests.controller.bridges.ros2_probe import WatchingProbe
+from tests.controller.bridges.ros2_processes import joined, serving
 
 PACED_ATTEMPTS = 3
 """How often a busy machine gets the chance to keep real time for a demo."""

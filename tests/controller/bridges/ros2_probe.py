@@ -11,11 +11,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from benchmarks.bridges.processes import wait_until
-from benchmarks.bridges.ros2_processes import DISCOVERY, Probe
 from controller.bridges.ros2 import ODOM, topic
 from go2_wbc.errors import BridgeError
 from go2_wbc.robot.state import RobotState
+from tests.controller.bridges.processes import wait_until
+from tests.controller.bridges.ros2_processes import DISCOVERY, Probe
 
 ODOM_QUEUE: Final = 5
 """Messages of odometry that wait for a probe: more of them would be stale on a busy machine."""

@@ -13,8 +13,8 @@ from unittest.mock import patch
 
 import pytest
 
-from benchmarks.bridges.processes import Process, wait_until
 from go2_wbc.errors import BridgeError, CommandError, ConfigError
+from tests.controller.bridges.processes import Process, wait_until
 from tests.controller.bridges.ros2_graph import ROOT, needs_ros2
 from tests.controller.bridges.ros2_probe import WatchingProbe
 

@@ -7,9 +7,9 @@ import sys
 
 import pytest
 
-from benchmarks.bridges.processes import Process
 from controller.bridges.ros2.namespace_lock import lock_namespace
 from go2_wbc.errors import BridgeError
+from tests.controller.bridges.processes import Process
 
 pytestmark = pytest.mark.skipif(
     not sys.platform.startswith("linux"), reason="sockets without files are Linux's"

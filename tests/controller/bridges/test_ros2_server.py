@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.bridges.processes import Process, wait_until
-from benchmarks.bridges.ros2_processes import ANSWER, DISCOVERY, serving
 from go2_wbc.plant.sensors import EXACT
+from tests.controller.bridges.processes import Process, wait_until
 from tests.controller.bridges.ros2_graph import needs_ros2
 from tests.controller.bridges.ros2_probe import Place, WatchingProbe, without
+from tests.controller.bridges.ros2_processes import ANSWER, DISCOVERY, serving
 
 pytestmark = needs_ros2
 

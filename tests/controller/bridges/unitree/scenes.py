@@ -10,8 +10,12 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.bridges.processes import Process, wait_until
-from benchmarks.bridges.unitree_processes import (
+from controller.bridges.unitree.low_level import low_cmd_message
+from controller.bridges.unitree.messages import encode_message
+from controller.bridges.unitree.sport_api import SWITCHER_SERVICE, Api, Code, SwitcherApi
+from go2_wbc.robot.state import JointCommand
+from tests.controller.bridges.processes import Process, wait_until
+from tests.controller.bridges.unitree_processes import (
     LIMIT,
     Scene,
     client_of,
@@ -19,10 +23,6 @@ from benchmarks.bridges.unitree_processes import (
     simulator,
     tilt_of,
 )
-from controller.bridges.unitree.low_level import low_cmd_message
-from controller.bridges.unitree.messages import encode_message
-from controller.bridges.unitree.sport_api import SWITCHER_SERVICE, Api, Code, SwitcherApi
-from go2_wbc.robot.state import JointCommand
 
 FLOOD: Final = 5000.0
 """Samples per second."""

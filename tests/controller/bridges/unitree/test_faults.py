@@ -8,12 +8,12 @@ from typing import Final
 
 import pytest
 
-from benchmarks.bridges.processes import PROGRAM, Process, wait_until
-from benchmarks.bridges.unitree_processes import LIMIT, MOVE, driver, simulator
 from controller.bridges.unitree.sport_api import Api, Code, SportMode
 from controller.cli.common import ExitCode
+from tests.controller.bridges.processes import PROGRAM, Process, wait_until
 from tests.controller.bridges.unitree.scenes import DAMPED, WatchedScene, flood, garbage, watched
 from tests.controller.bridges.unitree.support import needs_dds
+from tests.controller.bridges.unitree_processes import LIMIT, MOVE, driver, simulator
 
 BAD_MOVES: Final = ('{"x": NaN, "y": 0, "z": 0}', "rubbish", "[1]", '{"x": "fast"}')
 PATIENT: Final = ("--stale-limit", "1.0")
@@ -21,7 +21,7 @@ PATIENT: Final = ("--stale-limit", "1.0")
 ENDLESS_TROT: Final = (*PATIENT, "--steps", "stand", "trot", "--seconds", "60")
 MOVER: Final = """
 import sys, time
-from benchmarks.bridges.unitree_processes import MOVE
+from tests.controller.bridges.unitree_processes import MOVE
 from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.rpc import Client
 from controller.bridges.unitree.sport_api import SPORT_SERVICE, Api

@@ -12,9 +12,8 @@ from typing import Any
 
 import pytest
 
-from benchmarks.bridges.processes import PROGRAM, Process
-from benchmarks.bridges.unitree_processes import good_commands, own_domain, simulator
 from controller.bridges.unitree.sport_api import Code, SportMode
+from tests.controller.bridges.processes import PROGRAM, Process
 from tests.controller.bridges.unitree.support import (
     CPP_SDK,
     OLD_STOCK_SDK,
@@ -23,6 +22,7 @@ from tests.controller.bridges.unitree.support import (
     needs_dds,
     peer_python,
 )
+from tests.controller.bridges.unitree_processes import good_commands, own_domain, simulator
 
 pytestmark = [needs_dds, pytest.mark.slow]
 PEERS = Path(__file__).parent / "peers"

@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from benchmarks.bridges.processes import wait_until
 from controller import GO2Controller
 from controller.bridges.unitree import messages
 from controller.bridges.unitree.guards import GuardConfig
@@ -32,6 +31,7 @@ from go2_wbc.plant.base import Plant
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand
 from motions import Timeline, compile_timeline
+from tests.controller.bridges.processes import wait_until
 from tests.controller.bridges.unitree.support import needs_dds
 
 pytestmark = needs_dds

@@ -11,7 +11,6 @@ from unittest.mock import create_autospec
 
 import pytest
 
-from benchmarks.bridges.processes import wait_until
 from controller.bridges.unitree import sport_api, sport_robot, sport_service
 from controller.bridges.unitree.messages import Request
 from controller.bridges.unitree.sport_api import Api, Code, SportMode
@@ -25,6 +24,7 @@ from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.pose import LEVEL, BodyPose
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion, motion_names
+from tests.controller.bridges.processes import wait_until
 from tests.controller.plants import HANG_GUARD, lying_state
 
 LEAN = '{"x": 0.1, "y": 0.1, "z": 0.0}'

@@ -8,7 +8,6 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from benchmarks.bridges.processes import wait_until
 from controller.behaviours.plans import ChangePosture
 from controller.bridges.unitree import sport_robot
 from controller.bridges.unitree.sport_api import Api
@@ -19,6 +18,7 @@ from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.pose import LEVEL, BodyPose
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
+from tests.controller.bridges.processes import wait_until
 from tests.controller.plants import HANG_GUARD
 
 PUSH, PUSH_TIME = 300.0, 0.1  # N, s: feet in place do not hold it

@@ -10,8 +10,6 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from benchmarks.bridges.processes import wait_until
-from benchmarks.bridges.unitree_processes import client_of
 from controller.bridges.unitree.sport_api import (
     LEASE_TERM,
     PATH_FIELDS,
@@ -24,8 +22,10 @@ from controller.bridges.unitree.sport_api import (
 )
 from controller.bridges.unitree.sport_robot import POSE
 from controller.bridges.unitree.sport_service import PATIENCE
+from tests.controller.bridges.processes import wait_until
 from tests.controller.bridges.unitree.scenes import WatchedScene, watched
 from tests.controller.bridges.unitree.support import needs_dds
+from tests.controller.bridges.unitree_processes import client_of
 
 pytestmark = [needs_dds, pytest.mark.slow]
 FRONT = slice(0, 2)  # of the feet in Unitree's order: FR FL RR RL

@@ -13,7 +13,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
-from benchmarks.bridges.processes import PROGRAM, Process
 from controller.bridges.ros2 import (
     BEHAVIOR_SERVICE,
     CMD_VEL,
@@ -22,6 +21,7 @@ from controller.bridges.ros2 import (
     topic,
 )
 from go2_wbc.errors import BridgeError
+from tests.controller.bridges.processes import PROGRAM, Process
 
 if TYPE_CHECKING:
     from controller.bridges.ros2 import GO2ControllerNode

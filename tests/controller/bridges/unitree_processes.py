@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from jaxtyping import Shaped
 
-from benchmarks.bridges.processes import PROGRAM, START_LIMIT, Process, wait_until
 from controller.bridges.unitree.messages import SPORT_STATE, decode_message
 from controller.bridges.unitree.sport_api import (
     SPORT_SERVICE,
@@ -23,6 +22,7 @@ from controller.bridges.unitree.sport_api import (
     Code,
 )
 from go2_wbc.errors import BridgeError, PlantTimeout
+from tests.controller.bridges.processes import PROGRAM, START_LIMIT, Process, wait_until
 
 if TYPE_CHECKING:
     from controller.bridges.unitree.bus import Bus
