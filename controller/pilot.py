@@ -199,7 +199,7 @@ class Pilot:
         """Zero the command, level the trunk and let the walking robot come to rest."""
         if self.mode is Mode.WALKING:
             self._walker.halt()
-            self._walker.finish("come to rest")
+            self._walker.calm_down("come to rest")
         return self._runner.measurements()
 
     def _finish_walking(self, what: str) -> None:

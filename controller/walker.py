@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from controller.behaviours.walking import Walking
+from controller.checks import is_calm
 from controller.runner import Runner
 from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS, Gait, find_gait
@@ -124,7 +125,18 @@ class Walker:
     def finish(self, what: str) -> None:
         """Let the steps come to an end."""
         walking, loop = self.walking, self._runner.loop
-        self._runner.until(lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, what)
+        self._runner.until(
+            lambda: walking.is_finished(loop.snapshot),
+            STOP_LIMIT,
+            what,
+            lambda: walking.why_not_finished(loop.snapshot),
+        )
+
+    def calm_down(self, what: str) -> None:
+        """Let the steps come to an end, and what is left of the trunk's motion."""
+        self.finish(what)
+        walking = self.walking
+        self._runner.settle(what, lambda now: walking.is_finished(now) and is_calm(now))
 
     def square_up(self) -> bool:
         """Start to put the feet below the hips; returns whether they are."""

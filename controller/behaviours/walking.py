@@ -87,3 +87,9 @@ class Walking(Behaviour):
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether the robot has come to rest."""
         return self.command.is_zero and not self._planner.is_stepping
+
+    def why_not_finished(self, snapshot: Snapshot) -> str:
+        """What has yet to happen until the robot rests, in plain words."""
+        if not self.command.is_zero:
+            return "it is commanded"
+        return self._planner.why_not_resting(snapshot)

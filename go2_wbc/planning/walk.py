@@ -152,6 +152,18 @@ class Foot(Record):
     swing: Swing
 
 
+class Rest(Record):
+    """How the robot comes to rest.
+
+    Attributes:
+        landings: how often feet have come down since it has had no command.
+        place: where the CoM shall be while the robot rests [m].
+    """
+
+    landings: float
+    place: Float[np.ndarray, "2"]
+
+
 class PlannedForces(Record):
     """What the MPC has planned last.
 
@@ -179,6 +191,7 @@ class Planner(Record):
     trunk: Trunk
     ground: Ground
     slip: Slip
+    rest: Rest
     feet: tuple[Foot, Foot, Foot, Foot]
     planned: PlannedForces
     robot: Robot
