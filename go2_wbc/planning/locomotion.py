@@ -248,7 +248,7 @@ class LocomotionPlanner:
         self._state = Planner(
             time=snapshot.state.time,
             trunk=Trunk(yaw=snapshot.state.yaw, position=snapshot.p_world_com[:2]),
-            rest=Rest(place=snapshot.p_world_com[:2]),
+            rest=Rest(place=snapshot.p_world_com[:2], middle=snapshot.p_world_feet.mean(axis=0)),
             ground=ground_below(snapshot, self._model.foot_radius),
             slip=Slip(friction=self._config.slip.most),
             feet=feet,

@@ -158,10 +158,12 @@ class Rest(Record):
     Attributes:
         landings: how often feet have come down since it has had no command.
         place: where the CoM shall be while the robot rests [m].
+        middle: of the feet at the last tick at rest [m].
     """
 
     landings: float
     place: Float[np.ndarray, "2"]
+    middle: Float[np.ndarray, "3"]
 
 
 class PlannedForces(Record):

@@ -162,5 +162,18 @@ def test_the_trunk_goes_slowly_to_where_it_shall_rest() -> None:
     assert np.linalg.norm(ways[-1] - middle) < SHIFT + EXACT
 
 
+def test_what_a_resting_robot_is_asked_stays_with_its_feet_when_the_estimate_moves() -> None:
+    """Its trunk sank by 9 mm, at 20 mm/s, as its estimator learnt that it rests."""
+    jump = np.array([0.004, -0.003, 0.009])
+    start = resting()
+    planner, ticks = stepped(start)
+    before = planner.update(at(start, ticks * TICK), ZERO_COMMAND).body.p_world
+    moved = start.replaced(
+        p_world_feet=start.p_world_feet + jump, p_world_com=start.p_world_com + jump
+    )
+    after = planner.update(at(moved, (ticks + 1) * TICK), ZERO_COMMAND).body.p_world
+    np.testing.assert_allclose(after - before, jump, atol=SHIFT_SPEED * TICK)
+
+
 def test_margins_leave_room_for_a_square_stance() -> None:
     assert capture_inside(resting(), WALK) > 2.0 * REST_MARGIN
