@@ -50,6 +50,7 @@ MODULES = (
     "go2_wbc.reference",
     "go2_wbc.robot.estimator",
     "go2_wbc.robot.joint_friction",
+    "go2_wbc.robot.latency",
     "go2_wbc.robot.leg_kinematics",
     "go2_wbc.robot.motor",
     "go2_wbc.robot.payload_estimation",
