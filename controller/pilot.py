@@ -145,7 +145,8 @@ class Pilot:
 
     def _make_standing(self, entry: Posture, duration: float) -> Standing:
         make_plan = partial(rise, entry=entry, duration=duration)
-        return Standing(make_plan, self._model, self._config.locomotion)
+        friction = self._walker.walking.friction
+        return Standing(make_plan, self._model, self._config.locomotion, friction)
 
     def _settle(self, posture: Posture, what: str) -> Measurements:
         _, check = _RESTING[posture]

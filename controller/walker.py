@@ -29,11 +29,11 @@ class Walker:
     def __init__(self, runner: Runner, config: Config) -> None:
         """Walk on ``runner``, at first with the trot."""
         self._runner, self._config = runner, config
-        self.walking = self._make(find_gait("trot"))
+        self.walking = self._make(find_gait("trot"), None)
         self._envelope = self._envelope_of(self.walking)
 
-    def _make(self, gait: Gait) -> Walking:
-        return Walking(self._runner.loop.model, gait, self._config.locomotion)
+    def _make(self, gait: Gait, friction: float | None) -> Walking:
+        return Walking(self._runner.loop.model, gait, self._config.locomotion, friction)
 
     @property
     def limits(self) -> str:
@@ -54,7 +54,8 @@ class Walker:
     def start(self, gait: str | Gait) -> None:
         """Stand ready to walk with ``gait``."""
         choice = self._choice(gait)
-        walking = self._make(find_gait(LADDER[0] if gait == AUTO else gait))
+        gait = find_gait(LADDER[0] if gait == AUTO else gait)
+        walking = self._make(gait, self.walking.friction)
         walking.choice = choice
         self._runner.engage(walking)
         self.walking = walking

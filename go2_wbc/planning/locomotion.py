@@ -214,7 +214,7 @@ def plan(
         stands[leg] = follow_contact(
             foot, c.config.contact, above, contact[leg], stance[leg], progress[leg], dt
         )
-    observe_slip(s.slip, c.config.slip, now, contact, tau, stands, dt)
+    observe_slip(s.slip, c.config.slip, now, contact, tau, stands, s.is_stepping, dt)
     note_liftoffs(now, s, c, contact, stance, progress)
     target.friction = level_friction(
         s.ground, c.config.ground, s.slip.friction, c.config.slip.least
@@ -236,8 +236,14 @@ class LocomotionPlanner:
         self._state, self._command = Planner(), Command()
         self.change_gait(gait)
 
-    def start(self, snapshot: Snapshot) -> None:
-        """Begin from the measured state, standing."""
+    def start(self, snapshot: Snapshot, friction: float | None = None) -> None:
+        """Begin from the measured state, standing.
+
+        Args:
+            snapshot: of this tick.
+            friction: of the ground, as it is known; None if nothing is.
+        """
+        slip = self._config.slip
         feet = [
             Foot(
                 contact=FootContact(since=np.inf, was_stance=True),
@@ -250,7 +256,7 @@ class LocomotionPlanner:
             trunk=Trunk(yaw=snapshot.state.yaw, position=snapshot.p_world_com[:2]),
             rest=Rest(place=snapshot.p_world_com[:2], middle=snapshot.p_world_feet.mean(axis=0)),
             ground=ground_below(snapshot, self._model.foot_radius),
-            slip=Slip(friction=self._config.slip.most),
+            slip=Slip(friction=min(slip.first if friction is None else friction, slip.most)),
             feet=feet,
             planned=PlannedForces(next=-np.inf),
         )
@@ -278,6 +284,11 @@ class LocomotionPlanner:
     def heading(self) -> float:
         """Yaw [rad] of the reference; 0 before ``start``."""
         return float(self._state.trunk.yaw)
+
+    @property
+    def friction(self) -> float:
+        """Of the ground, as far as it has been shown; 0 before ``start``."""
+        return float(self._state.slip.friction)
 
     def square_up(self, snapshot: Snapshot) -> bool:
         """Start stepping unless every foot is below its hip; returns whether they all are."""

@@ -33,9 +33,9 @@ def sliding(
     return snapshot.replaced(state=state, v_world_contacts=v)
 
 
-def look(slip: Slip, snapshot: Snapshot) -> None:
+def look(slip: Slip, snapshot: Snapshot, *, steps: bool = True) -> None:
     state = snapshot.state
-    observe_slip(slip, CONFIG, snapshot, state.feet_in_contact, state.tau, STANCE, TICK)
+    observe_slip(slip, CONFIG, snapshot, state.feet_in_contact, state.tau, STANCE, steps, TICK)
 
 
 def after(snapshot: Snapshot, seconds: float) -> Slip:
@@ -122,6 +122,13 @@ def test_the_friction_comes_back_slowly() -> None:
     for _ in range(500):
         look(slip, sliding(0.0))
     assert slip.friction == pytest.approx(low + CONFIG.recovery, abs=1e-6)
+
+
+def test_a_robot_that_only_stands_shows_nothing_of_the_friction() -> None:
+    slip = Slip(friction=CONFIG.first)
+    for _ in range(500):
+        look(slip, sliding(0.0), steps=False)
+    assert slip.friction == CONFIG.first
 
 
 def test_bounds_that_cross_are_refused() -> None:
