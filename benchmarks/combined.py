@@ -55,7 +55,7 @@ def _share(name: str, item: str, what: str, least: float | None = 1.0) -> Metric
 
 def measure_rest(trial: Trial, robot: Robot) -> Measurement:
     """The share of the walks after which each call does what it says."""
-    done, notes = dict.fromkeys(CALLS, 0), dict[str, str]()
+    done, notes = dict[str, int].fromkeys(CALLS, 0), dict[str, str]()
     walks = list(product(SPEEDS, TIMES))
     for speed, time in walks:
         plant = robot.plant(FIRST_SEED + trial.seed, trial.sensors)
@@ -70,7 +70,7 @@ def measure_rest(trial: Trial, robot: Robot) -> Measurement:
 
 def _ends(tried: TrialRobot, speed: float, time: float) -> dict[str, bool]:
     """Whether each call after a walk does what it says."""
-    go2, done = tried.go2, dict.fromkeys(CALLS, False)
+    go2, done = tried.go2, dict[str, bool].fromkeys(CALLS, False)
     try:
         tried.require(go2.stand())
         tried.require(go2.walk())

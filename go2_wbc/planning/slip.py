@@ -55,7 +55,9 @@ class SlipConfig:
         time_constant: of the fall [s].
         recovery: rate [1/s] of the rise.
         least, most: bounds of the estimate.
-        first: where it begins on ground of which nothing is known.
+        first: where it begins on ground of which nothing is known. With 0.35 a robot on its own
+            sensors fell on a friction of 0.2 with 10 ms; with this it follows a curve as it begins
+            by 0.03 m/s less exactly than with 0.6, and withstands the same pushes.
         half_speed: of a sliding contact point [m/s], at which the ground bears half of the force
             along it that the torques make.
     """
@@ -68,7 +70,7 @@ class SlipConfig:
     recovery: float = 0.1
     least: float = 0.12
     most: float = 0.6
-    first: float = 0.35
+    first: float = 0.2
     half_speed: float = 0.5
 
     def __post_init__(self) -> None:

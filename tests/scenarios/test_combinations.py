@@ -10,7 +10,9 @@ from go2_wbc.plant import MujocoPlant
 
 @pytest.mark.slow
 @pytest.mark.parametrize("sensors", ["ideal", "imu"])
-@pytest.mark.parametrize(("friction", "payload", "speed"), [(0.2, 0.0, 1.0), (0.3, 4.0, 0.5)])
+@pytest.mark.parametrize(
+    ("friction", "payload", "speed"), [(0.2, 0.0, 1.0), (0.3, 4.0, 0.5), (0.2, 4.0, 1.0)]
+)
 def test_a_robot_whose_commands_are_late_walks_on_slippery_ground_with_a_load(
     friction: float, payload: float, speed: float, sensors: str
 ) -> None:
