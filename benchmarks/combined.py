@@ -1,8 +1,7 @@
-"""Coming to rest, and worlds that are hard in several ways at once.
+"""``python -m benchmarks combined``: coming to rest, and worlds hard in several ways at once.
 
-Rows of ``python -m benchmarks locomotion``, in the groups ``rest`` and ``combined``. The controller
-has its own configuration and is told nothing; MuJoCo judges. Numbers were chosen on seeds 0 to 99;
-those that are judged begin at ``FIRST_SEED``.
+The controller has its own configuration, but for ``damped``, and is told nothing; MuJoCo judges.
+Numbers were chosen on seeds 0 to 99; those that are judged begin at ``FIRST_SEED``.
 
 - rest: a trial walks at each of ``SPEEDS`` for each of ``TIMES``, stops, and is watched for
   ``WATCHED`` seconds, in which a robot whose ``stop`` said True must stay slower than ``AT_REST``;
@@ -20,6 +19,7 @@ from itertools import product
 
 import numpy as np
 
+from benchmarks.command import Benchmark
 from benchmarks.study import Direction, Measurement, Metric, Study, sensed
 from benchmarks.unknown_world import DAMPED, FED, Robot
 from controller.sweeps.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot
@@ -34,7 +34,7 @@ SPEEDS, TIMES = (0.3, 0.5, 0.8, 1.2), (2.0, 5.0, 8.0, 12.0)
 """m/s and s."""
 AT_REST, WATCHED = 0.02, 2.0
 """Speed [m/s] of the CoM at rest, and for how long it is watched [s]."""
-CALLS = ("stop", "stays", "high-five", "turn-left", "sit")
+CALLS: tuple[str, ...] = ("stop", "stays", "high-five", "turn-left", "sit")
 DELAYS, FRICTIONS = (0.0, 0.004, 0.008, 0.01, 0.014), (0.2, 0.3, 0.4, 0.6)
 LOADS, WALKS = (0.0, 4.0), (0.5, 1.0)
 """kg and m/s."""
@@ -155,3 +155,13 @@ _CURVE = Study(
 _ALL = (*map(_rest, RESTING), *(_combined(*cell) for cell in product(DELAYS, FRICTIONS)), _CURVE)
 STUDIES = (*_ALL, *(sensed(study, study.group) for study in _ALL))
 """In the order of the report."""
+
+
+BENCHMARK = Benchmark(
+    "combined",
+    "Rest after walks; late commands on slippery ground with a load.",
+    STUDIES,
+    takes="three hours on two cores",
+    examples=("--rows rest --seeds 1", "--rows late-10-on-0.2"),
+)
+register, run = BENCHMARK.register, BENCHMARK.run

@@ -12,8 +12,7 @@ seeds 0 to 9; those judged begin at ``FIRST_SEED``.
 - turning: from the heading (unwrapped) at both ends of the window;
 - saturated ticks: share of ticks in which some motor gives all it has at its speed.
 
-``benchmarks.unknown_world`` has the groups ``unknown``, ``unknown-sensors`` and ``robots``,
-``benchmarks.combined`` those of ``rest`` and ``combined``.
+``benchmarks.unknown_world`` has the groups ``unknown``, ``unknown-sensors`` and ``robots``.
 """
 
 from __future__ import annotations
@@ -25,7 +24,6 @@ from functools import partial
 import numpy as np
 
 from benchmarks import library, truth_vs_estimate
-from benchmarks.combined import STUDIES as COMBINED
 from benchmarks.command import Benchmark
 from benchmarks.robots import plant_of
 from benchmarks.study import Measurement, Metric, Study, sensed
@@ -169,7 +167,6 @@ STUDIES = (
     *truth_vs_estimate.STUDIES,
     library.ON_SENSORS,
     *UNKNOWN,
-    *COMBINED,
 )
 """In the order of the report."""
 

@@ -56,7 +56,8 @@ class ControlLoop:
 
     Attributes:
         behaviour: what the robot does now.
-        snapshot: of the last tick.
+        snapshot: of the last tick; of a simulated robot when the tick's command acts.
+        latency: how late that is.
         fault: why the last behaviour was ended by the loop, or None.
         warn: writes a line of the log, as ``logging.Logger.warning`` does.
     """
@@ -171,7 +172,7 @@ class ControlLoop:
         if is_finite and state.time > self.state.time:
             self._unanswered = 0
             self.state = state
-            self._ahead = self.latency.ahead(state)
+            self._ahead = state if self.plant.is_hardware else self.latency.ahead(state)
             self.snapshot = self.model.snapshot(self._ahead, self._payload_of(self.behaviour))
             return
         silence = self._unanswered * self.plant.control_period
