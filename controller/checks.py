@@ -11,6 +11,9 @@ from motions.postures import SIT_POSE, STAND_HEIGHT, TUCKED_JOINTS
 
 STILL_SPEED = 0.05
 """Speed [m/s] of the base below which it counts as still."""
+CALM_SPEED = 0.015
+"""Speed [m/s] of the CoM below which a robot that has walked counts as at rest: it shifts its trunk
+by 0.01 (``planning.rest``), and its sensors may be off by the difference to 0.02."""
 STILL_JOINTS = 0.5
 """Joint speed [rad/s] below which a leg counts as still."""
 HEIGHT_TOLERANCE = 0.02
@@ -56,6 +59,11 @@ def is_still(snapshot: Snapshot) -> bool:
     """Whether base and joints are at rest."""
     v = snapshot.state.v
     return bool(np.abs(v[:3]).max() < STILL_SPEED and np.abs(v[6:]).max() < STILL_JOINTS)
+
+
+def is_calm(snapshot: Snapshot) -> bool:
+    """Whether the CoM of a robot that has walked is at rest."""
+    return bool(np.linalg.norm(snapshot.v_world_com) < CALM_SPEED)
 
 
 def _is_on_its_feet(snapshot: Snapshot, height_error: float, pitch: float) -> bool:

@@ -22,6 +22,7 @@ from controller.telemetry import Telemetry
 from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible
 from go2_wbc.plant.base import Plant
 from go2_wbc.reference import JointReference, Reference, Target, sag_and_lean
+from go2_wbc.robot.latency import Latency
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor_watch import MotorWatch
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
@@ -56,7 +57,8 @@ class ControlLoop:
 
     Attributes:
         behaviour: what the robot does now.
-        snapshot: of the last tick.
+        snapshot: of the last tick; of a simulated robot when the tick's command acts.
+        latency: how late that is.
         fault: why the last behaviour was ended by the loop, or None.
         health: which parts are broken.
         warn: writes a line of the log, as ``logging.Logger.warning`` does.
@@ -97,6 +99,8 @@ class ControlLoop:
         if not _is_plausible(self.state):
             raise PlantError(f"the first state of the plant is not finite: q={self.state.q}")
         self.snapshot: Snapshot = model.snapshot(self.state)
+        self.latency = Latency(plant.control_period)
+        self._ahead = self.state
         self._payloads = payloads
         self._motors = MotorWatch(model.motor)
         self.health = Health()
@@ -119,7 +123,7 @@ class ControlLoop:
         """
         if observe:
             self._observe()
-        self.snapshot = self.model.snapshot(self.state, self._payload_of(behaviour))
+        self.snapshot = self.model.snapshot(self._ahead, self._payload_of(behaviour))
         self.fault = None
         self._qp_failures_in_a_row, self._grave_since = 0, inf
         self._falls.begin()
@@ -154,7 +158,10 @@ class ControlLoop:
             self._feel()
             target = self.behaviour.update(self.snapshot)
             self._sag, self._lean = self._sag_and_lean(target)
+            self._foretold = False
             command = self._command(target)
+            if not self._foretold:
+                self.latency.forget()
             self._last_command = command
             self.plant.write(command)
             self._unanswered += 1
@@ -172,7 +179,8 @@ class ControlLoop:
         if is_finite and state.time > self.state.time:
             self._unanswered = 0
             self.state = state
-            self.snapshot = self.model.snapshot(state, self._payload_of(self.behaviour))
+            self._ahead = state if self.plant.is_hardware else self.latency.ahead(state)
+            self.snapshot = self.model.snapshot(self._ahead, self._payload_of(self.behaviour))
             return True
         silence = self._unanswered * self.plant.control_period
         if silence > self._safety.stale_limit:
@@ -238,6 +246,11 @@ class ControlLoop:
         if solution.is_relaxed:
             return self._relaxed(solution)
         self._qp_failures_in_a_row, self._grave_since = 0, inf
+        return self._followed(solution)
+
+    def _followed(self, solution: WbcSolution) -> JointCommand:
+        self.latency.note(solution.tau_motors, solution.qdd)
+        self._foretold = True
         return solution.command
 
     def _relaxed(self, solution: WbcSolution) -> JointCommand:
@@ -246,12 +259,12 @@ class ControlLoop:
         self._qp_failures_in_a_row = 0
         if not is_grave(solution.violations):
             self._grave_since = inf
-            return solution.command
+            return self._followed(solution)
         self.telemetry.grave_ticks += 1
         self._grave_since = min(self._grave_since, self.state.time)
         lasted = self.state.time - self._grave_since
         if lasted < self._safety.grave_limit_time:
-            return solution.command
+            return self._followed(solution)
         worst = ", ".join(f"{row.name} {row.norm:.0f} {row.unit}" for row in solution.violations)
         reason = f"damped after {lasted:.2f} s of broken constraints: {worst}"
         self.abandon(Fault(reason, may_fall=True))

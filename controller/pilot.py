@@ -147,7 +147,8 @@ class Pilot:
 
     def _make_standing(self, entry: Posture, duration: float) -> Standing:
         make_plan = partial(rise, entry=entry, duration=duration)
-        return Standing(make_plan, self._loop.model, self._config.locomotion)
+        friction = self._walker.walking.friction
+        return Standing(make_plan, self._loop.model, self._config.locomotion, friction)
 
     def _settle(self, posture: Posture, what: str) -> Measurements:
         _, check = _RESTING[posture]
@@ -201,7 +202,7 @@ class Pilot:
         """Zero the command, level the trunk and let the walking robot come to rest."""
         if self.mode is Mode.WALKING:
             self._walker.halt()
-            self._walker.finish("come to rest")
+            self._walker.calm_down("come to rest")
         return self._runner.measurements()
 
     def _finish_walking(self, what: str) -> None:

@@ -267,10 +267,16 @@ class Runner:
 
         return self._comes(calm, SETTLE_LIMIT)
 
-    def until(self, is_done: Callable[[], bool], limit: float, what: str) -> None:
-        """Let time pass until ``is_done()``, for ``limit`` seconds at most."""
+    def until(
+        self,
+        is_done: Callable[[], bool],
+        limit: float,
+        what: str,
+        why_not: Callable[[], str] = lambda: "",
+    ) -> None:
+        """Let time pass until ``is_done()``, for ``limit`` seconds at most; tells ``why_not``."""
         if not self._comes(is_done, limit):
-            raise self._late(what, limit)
+            raise self._late(what, limit, why_not())
 
     def _comes(self, is_done: Callable[[], bool], limit: float) -> bool:
         """Whether ``is_done()`` came within ``limit`` seconds; a fault is raised."""
@@ -284,9 +290,9 @@ class Runner:
             raise self._aborted(fault.reason)
         return False
 
-    def _late(self, what: str, limit: float) -> Aborted:
-        reason = f"{what} not done within {limit:.1f} s: {listed(self.measurements())}"
-        return self._aborted(reason)
+    def _late(self, what: str, limit: float, why_not: str = "") -> Aborted:
+        told = ", ".join(part for part in (why_not, listed(self.measurements())) if part)
+        return self._aborted(f"{what} not done within {limit:.1f} s: {told}")
 
     @property
     def is_stepping(self) -> bool:

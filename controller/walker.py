@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from controller.behaviours.walking import Walking
+from controller.checks import is_calm
 from controller.runner import Runner
 from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS, Gait, find_gait
@@ -27,11 +28,11 @@ class Walker:
     def __init__(self, runner: Runner, config: Config) -> None:
         """Walk on ``runner``, at first with the trot."""
         self._runner, self._config = runner, config
-        self.walking = self._make(find_gait("trot"))
+        self.walking = self._make(find_gait("trot"), None)
         self._envelope = self._envelope_of(self.walking)
 
-    def _make(self, gait: Gait) -> Walking:
-        return Walking(self._runner.loop.model, gait, self._config.locomotion)
+    def _make(self, gait: Gait, friction: float | None) -> Walking:
+        return Walking(self._runner.loop.model, gait, self._config.locomotion, friction)
 
     @property
     def limits(self) -> str:
@@ -52,7 +53,8 @@ class Walker:
     def start(self, gait: str | Gait) -> None:
         """Stand ready to walk with ``gait``."""
         choice = self._choice(gait)
-        walking = self._make(find_gait(LADDER[0] if gait == AUTO else gait))
+        gait = find_gait(LADDER[0] if gait == AUTO else gait)
+        walking = self._make(gait, self.walking.friction)
         walking.choice = choice
         self._runner.engage(walking)
         self.walking = walking
@@ -123,7 +125,18 @@ class Walker:
     def finish(self, what: str) -> None:
         """Let the steps come to an end."""
         walking, loop = self.walking, self._runner.loop
-        self._runner.until(lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, what)
+        self._runner.until(
+            lambda: walking.is_finished(loop.snapshot),
+            STOP_LIMIT,
+            what,
+            lambda: walking.why_not_finished(loop.snapshot),
+        )
+
+    def calm_down(self, what: str) -> None:
+        """Let the steps come to an end, and what is left of the trunk's motion."""
+        self.finish(what)
+        walking = self.walking
+        self._runner.settle(what, lambda now: walking.is_finished(now) and is_calm(now))
 
     def square_up(self) -> bool:
         """Start to put the feet below the hips; returns whether they are."""

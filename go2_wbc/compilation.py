@@ -55,10 +55,12 @@ _IS_PLAIN = os.environ.get(PLAIN_VARIABLE, "0") not in ("", "0")
 MODULES = (
     "go2_wbc.algebra.active_set",
     "go2_wbc.planning.locomotion",
+    "go2_wbc.planning.rest",
     "go2_wbc.plant.mujoco.layout",
     "go2_wbc.reference",
     "go2_wbc.robot.estimator",
     "go2_wbc.robot.joint_friction",
+    "go2_wbc.robot.latency",
     "go2_wbc.robot.leg_kinematics",
     "go2_wbc.robot.motor",
     "go2_wbc.robot.motor_watch",

@@ -10,6 +10,9 @@ that speed, until it is slow, instead of braking with all it has on feet that it
 first stride has a flight, as those of a fast trot; in the others the feet stand for longer than in
 a trot ahead, since every flight costs height, of which a robot that goes aside at that speed has
 none to lose. Once it has come to rest the robot stands where it is.
+
+A push does not wait until the ground has shown its friction: unless a walk has found it slippery,
+the steps count on as much as any walk does.
 """
 
 from __future__ import annotations
@@ -29,6 +32,7 @@ from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.locomotion import LEAST_HEIGHT, LocomotionConfig
+from go2_wbc.planning.slip import FIRST, MOST
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
@@ -79,6 +83,7 @@ class Standing(ChangePosture):
         make_plan: Callable[[Float[np.ndarray, "6"]], MotionPlan],
         model: RobotModel,
         config: LocomotionConfig,
+        friction: float | None = None,
     ) -> None:
         """Stand.
 
@@ -86,6 +91,7 @@ class Standing(ChangePosture):
             make_plan: as for ``ChangePosture``.
             model: of the robot that steps.
             config: how it steps.
+            friction: of the ground, as walks have shown it; None if they have not.
         """
         super().__init__(make_plan)
         mpc = replace(config.mpc, least_share=SHARE_OF_NODE)
@@ -97,6 +103,8 @@ class Standing(ChangePosture):
             position_leash=SHORT_LEASH,
             mpc=mpc,
         )
+        is_slippery = friction is not None and friction < FIRST
+        self._friction_of_steps = friction if is_slippery else MOST
         self._steps: Walking | None = None
 
     @property
@@ -117,7 +125,8 @@ class Standing(ChangePosture):
         if self._steps is None and not self.may_lie:
             offset = self._capture_offset(snapshot)
             if must_step(snapshot, offset):
-                self._steps = Walking(self._model, trot_against(snapshot, offset), self._config)
+                gait, friction = trot_against(snapshot, offset), self._friction_of_steps
+                self._steps = Walking(self._model, gait, self._config, friction)
                 self._steps.start(snapshot)
         return super().update(snapshot) if self._steps is None else _walk_on(self._steps, snapshot)
 

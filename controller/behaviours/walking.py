@@ -26,9 +26,16 @@ class Walking(Behaviour):
     label = "walk"
     knows_payload = True
 
-    def __init__(self, model: RobotModel, gait: Gait, config: LocomotionConfig) -> None:
-        """Walk with ``gait``."""
+    def __init__(
+        self,
+        model: RobotModel,
+        gait: Gait,
+        config: LocomotionConfig,
+        friction: float | None = None,
+    ) -> None:
+        """Walk with ``gait``, on ground whose ``friction`` is known, or None."""
         self.gait = gait
+        self._known_friction = friction
         self.command: VelocityCommand = ZERO_COMMAND
         self.pose: BodyPose = LEVEL
         self.choice: GaitChoice | None = None
@@ -37,7 +44,7 @@ class Walking(Behaviour):
 
     def start(self, snapshot: Snapshot) -> None:
         """Start from the measured state, standing."""
-        self._planner.start(snapshot)
+        self._planner.start(snapshot, self._known_friction)
 
     def update(self, snapshot: Snapshot) -> Reference:
         """The planner's reference."""
@@ -79,6 +86,11 @@ class Walking(Behaviour):
         return self._limit.clip(self.command) if now < self._is_limited_until else self.command
 
     @property
+    def friction(self) -> float | None:
+        """Of the ground, as far as it is known; None if nothing is."""
+        return self._planner.friction or self._known_friction
+
+    @property
     def follows_command(self) -> bool:
         """Whether the planner has ramped the command; the robot itself may yet catch up."""
         command = self.command.linear_x, self.command.linear_y, self.command.angular_z
@@ -87,3 +99,9 @@ class Walking(Behaviour):
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether the robot has come to rest."""
         return self.command.is_zero and not self._planner.is_stepping
+
+    def why_not_finished(self, snapshot: Snapshot) -> str:
+        """What has yet to happen until the robot rests, in plain words."""
+        if not self.command.is_zero:
+            return "it is commanded"
+        return self._planner.why_not_resting(snapshot)

@@ -8,9 +8,7 @@ frame (z up, x along the reference's yaw).
 - Ground: its height is learnt from the feet that should stand, each where its contact is first
   measured. A foot that comes down late has no contact yet when it should; taken for landed, it
   would raise the ground, and with it the trunk, step by step.
-- Stepping without a command: the capture point (Pratt et al., Capture Point, Humanoids 2006),
-  ``p + v / omega`` with ``omega = sqrt(g / h)``, is where an inverted pendulum of height ``h``
-  would come to rest above its foot; too far from the feet's middle, they must be moved there.
+- Stepping without a command: until the robot can rest, and where it is pushed (``rest``).
 """
 
 from __future__ import annotations
@@ -34,7 +32,16 @@ from go2_wbc.planning.ground import (
     note_stumble,
 )
 from go2_wbc.planning.pose import LEVEL, BodyPose, advance_pose
-from go2_wbc.planning.slip import LEAST, MOST, Slip, observe_slip
+from go2_wbc.planning.rest import (
+    come_to_rest,
+    is_square,
+    may_rest,
+    must_step,
+    rest_in_place,
+    start_stepping,
+    why_not_resting,
+)
+from go2_wbc.planning.slip import FIRST, LEAST, MOST, Slip, observe_slip
 from go2_wbc.planning.swing import Swing, begin_swing, resume_swing, swing_foot
 from go2_wbc.planning.trunk import (
     Command,
@@ -55,6 +62,7 @@ from go2_wbc.planning.walk import (
     LocomotionConfig,
     PlannedForces,
     Planner,
+    Rest,
     Walk,
 )
 from go2_wbc.records import packed
@@ -68,66 +76,17 @@ MID_SWING = 0.2
 """Share of a swing before and after its middle in which a foot that has contact stumbles."""
 
 
-@kernel
-def is_square(now: Snapshot, s: Planner, c: Walk) -> bool:
-    """Whether the feet form the nominal rectangle; their mean may be off: the body moves."""
-    offsets, mean = np.empty((4, 2)), np.zeros(2)
-    nominal_feet(now, s, c, c.cadence.rest.width, offsets)
-    for leg in range(4):
-        for i in range(2):
-            offsets[leg, i] = now.p_world_feet[leg, i] - offsets[leg, i]
-            mean[i] += offsets[leg, i] / 4
-    most = c.config.square_tolerance
-    for leg in range(4):
-        if not np.hypot(offsets[leg, 0] - mean[0], offsets[leg, 1] - mean[1]) < most:
-            return False
-    return True
-
-
-@subroutine
-def must_step(now: Snapshot, c: Walk) -> bool:
-    """Whether the capture point ``p + v / sqrt(g / h)`` is too far from the feet's middle."""
-    omega = np.sqrt(c.gravity / c.height)
-    offset = np.empty(2)
-    for i in range(2):
-        middle = 0.0
-        for leg in range(4):
-            middle += now.p_world_feet[leg, i] / 4
-        offset[i] = now.p_world_com[i] + now.v_world_com[i] / omega - middle
-    return np.hypot(offset[0], offset[1]) > c.config.capture_margin
-
-
-@subroutine
-def is_landing(s: Planner) -> bool:
-    """Whether feet touch down at this tick and no other one is in the air."""
-    has_landed = False
-    for leg in range(4):
-        stance, _, _ = foot_phase(s.clock, leg)
-        was_stance = s.feet[leg].contact.was_stance
-        if not (stance or was_stance):
-            return False
-        if stance and not was_stance:
-            has_landed = True
-    return has_landed
-
-
-@subroutine
-def may_stop(now: Snapshot, s: Planner, c: Walk) -> bool:
-    """Whether the robot is slow, no longer commanded, and stands squarely."""
-    slow = np.hypot(now.v_world_com[0], now.v_world_com[1]) < c.config.settle_speed
-    return is_settled(s.trunk) and slow and is_square(now, s, c)
-
-
 @subroutine
 def advance_phase(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -> None:
     """Start, go on, or come to rest."""
     if s.is_stepping:
         s.clock.time += dt
-        if is_zero(command) and is_landing(s) and may_stop(now, s, c):
-            s.is_stepping = False
+        if not is_zero(command):
+            s.rest.landings = 0.0
+        elif may_rest(now, s, c):
+            come_to_rest(now, s, c)
     elif not is_zero(command) or must_step(now, c):
-        s.is_stepping = True
-        restart(s.clock, c.cadence)
+        start_stepping(s, c)
 
 
 @subroutine
@@ -149,7 +108,10 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
     advance_pose(trunk.pose, trunk.pose_rate, config.pose, command.pose, dt)
     ramp(trunk.velocity, command, config.linear_acceleration, config.angular_acceleration, dt)
     follow_heading(trunk, now, config.yaw_leash, dt)
-    follow_position(trunk, now, config.position_leash, dt)
+    if s.is_stepping:
+        follow_position(trunk, now, config.position_leash, dt)
+    else:
+        rest_in_place(now, s, config.position_leash, dt)
     carry_ground(s.ground, now)
     correct_height(trunk, now, s.ground.height + c.height, dt)
 
@@ -249,7 +211,7 @@ def plan(
         foot, p = s.feet[leg].contact, now.p_world_feet[leg]
         above = p[2] - c.foot_radius - ground_at(s.ground, p[0], p[1])
         stands[leg] = follow_contact(foot, above, contact[leg], stance[leg], progress[leg], dt)
-    observe_slip(s.slip, now, contact, tau, stands, dt)
+    observe_slip(s.slip, now, contact, tau, stands, s.is_stepping, dt)
     note_liftoffs(now, s, c, contact, stance, progress)
     target.friction = level_friction(s.ground, s.slip.friction, LEAST)
     fill_body(s.trunk, s.ground, c.height, target)
@@ -269,8 +231,13 @@ class LocomotionPlanner:
         self._state, self._command = Planner(), Command()
         self.change_gait(gait)
 
-    def start(self, snapshot: Snapshot) -> None:
-        """Begin from the measured state, standing."""
+    def start(self, snapshot: Snapshot, friction: float | None = None) -> None:
+        """Begin from the measured state, standing.
+
+        Args:
+            snapshot: of this tick.
+            friction: of the ground, as it is known; None if nothing is.
+        """
         feet = [
             Foot(
                 contact=FootContact(since=np.inf, was_stance=True),
@@ -281,8 +248,9 @@ class LocomotionPlanner:
         self._state = Planner(
             time=snapshot.state.time,
             trunk=Trunk(yaw=snapshot.state.yaw, position=snapshot.p_world_com[:2]),
+            rest=Rest(place=snapshot.p_world_com[:2], middle=snapshot.p_world_feet.mean(axis=0)),
             ground=ground_below(snapshot, self._model.foot_radius),
-            slip=Slip(friction=MOST),
+            slip=Slip(friction=min(FIRST if friction is None else friction, MOST)),
             feet=feet,
             planned=PlannedForces(next=-np.inf),
         )
@@ -311,11 +279,21 @@ class LocomotionPlanner:
         """Yaw [rad] of the reference; 0 before ``start``."""
         return float(self._state.trunk.yaw)
 
+    @property
+    def friction(self) -> float:
+        """Of the ground, as far as it has been shown; 0 before ``start``."""
+        return float(self._state.slip.friction)
+
     def square_up(self, snapshot: Snapshot) -> bool:
         """Start stepping unless every foot is below its hip; returns whether they all are."""
-        self._state.is_stepping = not is_square(snapshot, self._state, self._walk)
-        restart(self._state.clock, self._walk.cadence)
-        return not self._state.is_stepping
+        is_done = bool(is_square(snapshot, self._state, self._walk))
+        if not is_done:
+            start_stepping(self._state, self._walk)
+        return is_done
+
+    def why_not_resting(self, snapshot: Snapshot) -> str:
+        """Why a robot without a command has not come to rest, in plain words; "" if it has."""
+        return why_not_resting(snapshot, self._state, self._walk)
 
     def update(
         self, snapshot: Snapshot, command: VelocityCommand, pose: BodyPose = LEVEL

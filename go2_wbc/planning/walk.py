@@ -152,6 +152,20 @@ class Foot(Record):
     swing: Swing
 
 
+class Rest(Record):
+    """How the robot comes to rest.
+
+    Attributes:
+        landings: how often feet have come down since it has had no command.
+        place: where the CoM shall be while the robot rests [m].
+        middle: of the feet at the last tick at rest [m].
+    """
+
+    landings: float
+    place: Float[np.ndarray, "2"]
+    middle: Float[np.ndarray, "3"]
+
+
 class PlannedForces(Record):
     """What the MPC has planned last.
 
@@ -179,6 +193,7 @@ class Planner(Record):
     trunk: Trunk
     ground: Ground
     slip: Slip
+    rest: Rest
     feet: tuple[Foot, Foot, Foot, Foot]
     planned: PlannedForces
     horizon: Horizon

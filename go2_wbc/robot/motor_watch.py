@@ -21,9 +21,9 @@ SETTLING = 0.1
 """Time constant [s] of the sums."""
 ASKED = 3.0
 """Root mean square [N m] of what is asked, from which on a motor is judged."""
-WEAK, DEAD = 0.62, 0.2
+WEAK, DEAD = 0.6, 0.2
 """Share below which it is broken, and below which it is dead."""
-LASTS = 0.06
+LASTS = 0.12
 """For how long [s]; a command that acts late lowers the share, as a leg strikes the ground."""
 
 

@@ -85,6 +85,23 @@ def tilt(plant: StillPlant, roll: float) -> None:
     plant.state = replace(plant.state, q=q)
 
 
+# --- late commands ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("is_hardware", [False, True])
+def test_a_simulated_robot_is_taken_where_it_will_be_and_one_that_may_be_real_where_it_is(
+    loop: ControlLoop, plant: StillPlant, monkeypatch: pytest.MonkeyPatch, *, is_hardware: bool
+) -> None:
+    monkeypatch.setattr(StillPlant, "is_hardware", is_hardware)
+    loop.engage(Balance(loop.model))
+    run(loop, 3)
+    assert loop.snapshot.state is loop.state
+    loop.latency._lag.ticks = 2.0
+    run(loop, 1)
+    assert (loop.snapshot.state is loop.state) is is_hardware
+    assert loop.snapshot.state.time == loop.state.time
+
+
 # --- QP failures ------------------------------------------------------------------------------
 
 

@@ -93,7 +93,7 @@ def test_a_robot_that_cannot_come_to_rest_walks_on_and_takes_commands(
     with monkeypatch.context() as patch:
         patch.setattr("controller.walker.STOP_LIMIT", 0.02)
         assert go2.stand() is False
-    assert "come to rest not done" in go2.last_outcome.reason
+    assert "come to rest not done within 0.0 s: it still slows down" in go2.last_outcome.reason
     assert go2.mode is Mode.WALKING
     go2.move(SLOW)
     go2.wait(0.5)

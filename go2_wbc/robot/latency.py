@@ -1,0 +1,144 @@
+"""How late commands act, and where the robot will be when the next one does.
+
+A command that is given now acts ``d`` control periods later. What the motors are measured to give
+is what was asked of them ``d + 1`` ticks before, so ``d`` is the lag at which the two differ least:
+
+    e_d' = (|tau - tau_asked[d]|^2 - e_d) / T,      d = argmin e_d
+
+As long as torques hardly change all lags fit alike and the last one found stays: another must fit
+better by a share of how much the torques themselves have changed.
+
+What the whole-body controller has asked for and what has not acted yet, it has also foretold: its
+accelerations. The state is carried on by them, v_i+1 = v_i + dt a_i, and the next torques are found
+for the robot as it will be then (Smith, Closer control of loops with dead time, 1957, with the
+model of the QP for the plant). On the flat a trot on a friction of 0.3 or less fell within a second
+with 10 ms, as one on 0.6 did with 20. Commands that act at once leave the state as it is, bit by
+bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import final
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.algebra.vectors import rotation_of
+from go2_wbc.compilation import Foreign, kernel
+from go2_wbc.records import Record
+from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.state_filter import turn
+
+LAGS = 11
+"""Control periods by which a command may be late, none included: up to 20 ms at 500 Hz."""
+MEMORY = 0.2
+"""Time [s] over which misfits are averaged."""
+BETTER = 0.01
+"""Share of the torques' own change by which another lag must fit better."""
+LEAST_CHANGE = 1e-3
+"""Mean square [N^2 m^2] of that change below which it says nothing."""
+
+
+class Lag(Record):
+    """What is known of how late commands act.
+
+    Attributes:
+        tau_asked: torques of the last commands [N m], the newest first.
+        qdd: accelerations that they were to make [m/s^2, rad/s^2].
+        known: how many of them there are without a break.
+        misfit: mean square [N^2 m^2] of what was measured less what was asked, of each lag.
+        change: the same of the torques asked for, from the first lag to the last.
+        ticks: the lag that fits, in control periods.
+    """
+
+    tau_asked: Float[np.ndarray, "11 12"]
+    qdd: Float[np.ndarray, "11 18"]
+    known: float
+    misfit: Float[np.ndarray, "11"]
+    change: float
+    ticks: float
+
+
+@kernel
+def note_command(
+    s: Lag, tau: Foreign[Float[np.ndarray, "12"]], qdd: Foreign[Float[np.ndarray, "18"]]
+) -> None:
+    """Remember what has just been asked for."""
+    for d in range(LAGS - 1, 0, -1):
+        s.tau_asked[d] = s.tau_asked[d - 1]
+        s.qdd[d] = s.qdd[d - 1]
+    for n in range(12):
+        s.tau_asked[0, n] = tau[n]
+    for n in range(18):
+        s.qdd[0, n] = qdd[n]
+    s.known = min(s.known + 1.0, LAGS)
+
+
+@kernel
+def observe_lag(s: Lag, tau: Foreign[Float[np.ndarray, "12"]], dt: float) -> None:
+    """Compare the torques measured now with those that were asked for."""
+    if s.known < LAGS:
+        return
+    share, change = min(dt / MEMORY, 1.0), 0.0
+    for d in range(LAGS):
+        square = 0.0
+        for n in range(12):
+            square += (tau[n] - s.tau_asked[d, n]) ** 2 / 12
+            if d == LAGS - 1:
+                change += (s.tau_asked[0, n] - s.tau_asked[d, n]) ** 2 / 12
+        s.misfit[d] += share * (square - s.misfit[d])
+    s.change += share * (change - s.change)
+    best = 0
+    for d in range(LAGS):
+        if s.misfit[d] < s.misfit[best]:
+            best = d
+    gained = s.misfit[int(s.ticks)] - s.misfit[best]
+    if s.change > LEAST_CHANGE and gained > BETTER * s.change:
+        s.ticks = best
+
+
+@kernel
+def carry_on(s: Lag, dt: float, q: Float[np.ndarray, "19"], v: Float[np.ndarray, "18"]) -> None:
+    """Bring a state to when the next command acts, by what those before it are to make."""
+    R = np.empty((3, 3))
+    for d in range(int(min(s.ticks, s.known)) - 1, -1, -1):
+        v += 0.5 * dt * s.qdd[d]
+        rotation_of(q[3], q[4], q[5], q[6], R)
+        for i in range(3):
+            q[i] += dt * (R[i, 0] * v[0] + R[i, 1] * v[1] + R[i, 2] * v[2])
+        turn(q[3:7], (dt * v[3], dt * v[4], dt * v[5]), False)
+        for n in range(12):
+            q[7 + n] += dt * v[6 + n]
+        v += 0.5 * dt * s.qdd[d]
+
+
+@final
+class Latency:
+    """Finds out how late the commands act, and looks ahead by that."""
+
+    def __init__(self, period: float) -> None:
+        """Of commands that are given every ``period`` seconds; at first they act at once."""
+        self._period, self._lag = period, Lag()
+
+    @property
+    def delay(self) -> float:
+        """Time [s] after which a command acts, as far as it is known."""
+        return float(self._lag.ticks) * self._period
+
+    def note(self, tau: Float[np.ndarray, "12"], qdd: Float[np.ndarray, "18"]) -> None:
+        """The torques [N m] that have just been asked for, and what they are to make."""
+        note_command(self._lag, tau, qdd)
+
+    def forget(self) -> None:
+        """Something else has been asked for, of which nothing is foretold."""
+        self._lag.known = 0.0
+
+    def ahead(self, state: RobotState) -> RobotState:
+        """The state when the next command acts; ``state`` itself if that is now."""
+        observe_lag(self._lag, state.tau, self._period)
+        if not self._lag.ticks:
+            return state
+        q, v = state.q.copy(), state.v.copy()
+        carry_on(self._lag, self._period, q, v)
+        return replace(state, q=q, v=v)

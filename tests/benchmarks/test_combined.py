@@ -1,0 +1,45 @@
+"""Rest and combined worlds: what a trial counts."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks import combined
+from benchmarks.combined import CALLS, RESTING, STUDIES, measure_combined, measure_rest
+from benchmarks.study import TrialResult
+from controller.sweeps.trials import Trial
+
+
+@pytest.fixture
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(combined, "SPEEDS", (0.5,))
+    monkeypatch.setattr(combined, "TIMES", (1.0,))
+    monkeypatch.setattr(combined, "LOADS", (0.0,))
+    monkeypatch.setattr(combined, "WALKS", (0.5,))
+    monkeypatch.setattr(combined, "WALK_TIME", 1.0)
+    monkeypatch.setattr(combined, "FIRST_SEED", 0)
+
+
+@pytest.mark.usefixtures("short")
+def test_every_call_after_a_walk_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    done, moved = TrialResult(), TrialResult()
+    measure_rest(Trial(0), done, RESTING[0])
+    assert done.values == dict.fromkeys(CALLS, 1.0)
+    monkeypatch.setattr(combined, "AT_REST", 0.0)
+    measure_rest(Trial(0), moved, RESTING[0])
+    assert {call for call in CALLS if not moved.values[call]} == {"stays"}
+    assert "stays 0.5 m/s 1 s" in moved.notes
+
+
+@pytest.mark.usefixtures("short")
+@pytest.mark.parametrize(("friction", "share"), [(0.6, 1.0), (0.01, 0.0)])
+def test_a_walk_on_ice_is_not_done(friction: float, share: float) -> None:
+    found = TrialResult()
+    measure_combined(Trial(0), found, 0.0, friction)
+    assert found.values == {"done": share}
+    assert len(found.notes) == 1.0 - share
+
+
+def test_each_study_stands_once_and_once_on_sensors() -> None:
+    names = [study.name for study in STUDIES]
+    assert len(set(names)) == len(names) == 2 * (len(RESTING) + 20 + 1)

@@ -1,0 +1,91 @@
+"""How late commands act is found from what motors give, and the state carried on by that."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from go2_wbc.robot.latency import LAGS, Latency
+from go2_wbc.robot.state import RobotState
+from tests import engine_helpers as helpers
+
+MODEL = helpers.symmetric_model()
+PERIOD = 0.002
+STILL = np.zeros(18)
+
+
+def jagged(rng: np.random.Generator, ticks: int, step: float = 1.0) -> np.ndarray:
+    """Torques [N m] that wander, as those of a walk do."""
+    return np.cumsum(step * rng.normal(size=(ticks, 12)), axis=0)
+
+
+def followed(
+    latency: Latency, asked: np.ndarray, late: int, noise: float = 0.0, seed: int = 0
+) -> None:
+    """Ask for one torque after the other of motors that give each ``late`` ticks later."""
+    rng, state = np.random.default_rng(seed), helpers.state_of(helpers.standing_q())
+    for tick in range(len(asked)):
+        acts = tick - 1 - late
+        tau = asked[acts] if acts >= 0 else np.zeros(12)
+        latency.ahead(replace(state, tau=tau + noise * rng.normal(size=12)))
+        latency.note(asked[tick], STILL)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+@pytest.mark.parametrize("late", [0, 1, 4, LAGS - 1])
+def test_the_delay_is_the_lag_at_which_motors_give_what_was_asked(late: int, noise: float) -> None:
+    latency = Latency(PERIOD)
+    followed(latency, jagged(np.random.default_rng(late), 500), late, noise)
+    assert latency.delay == pytest.approx(late * PERIOD)
+
+
+def test_a_delay_that_changes_is_found_again() -> None:
+    latency, asked = Latency(PERIOD), jagged(np.random.default_rng(2), 500)
+    for late in (5, 0, 3):
+        followed(latency, asked, late)
+        assert latency.delay == pytest.approx(late * PERIOD)
+
+
+def test_torques_that_do_not_change_tell_nothing() -> None:
+    latency, rng = Latency(PERIOD), np.random.default_rng(3)
+    asked = jagged(rng, 500)
+    followed(latency, np.vstack([asked, np.tile(asked[-1], (500, 1))]), 4, noise=0.02)
+    assert latency.delay == pytest.approx(4 * PERIOD)
+
+
+def test_a_state_is_left_alone_where_commands_act_at_once() -> None:
+    latency, state = Latency(PERIOD), helpers.random_state(np.random.default_rng(4))
+    followed(latency, jagged(np.random.default_rng(5), 100), 0)
+    assert latency.ahead(state) is state
+
+
+def test_what_is_asked_for_by_others_foretells_nothing_but_that_it_moves_on() -> None:
+    latency, state = Latency(PERIOD), helpers.random_state(np.random.default_rng(6))
+    followed(latency, jagged(np.random.default_rng(7), 200), 3)
+    latency.forget()
+    np.testing.assert_array_equal(latency.ahead(state).v, state.v)
+
+
+@pytest.mark.parametrize("late", [1, 5, 10])
+def test_the_state_is_carried_on_as_the_accelerations_say(late: int) -> None:
+    """Against Pinocchio's integration in a hundred times as many steps."""
+    rng = np.random.default_rng(late)
+    latency, state = Latency(PERIOD), helpers.random_state(rng)
+    followed(latency, jagged(rng, 200), late)
+    qdd = 20.0 * rng.normal(size=(LAGS, 18))
+    for row in qdd:
+        latency.note(np.zeros(12), row)
+    found = latency.ahead(state)
+    q, v, fine = state.q.copy(), state.v.copy(), 100
+    for row in qdd[LAGS - late :]:
+        for _ in range(fine):
+            v += PERIOD / fine * row
+            q = pin.integrate(MODEL.pin_model, q, PERIOD / fine * v)
+    np.testing.assert_allclose(found.v, v, atol=1e-9)
+    moved = pin.difference(MODEL.pin_model, q, found.q)
+    assert np.abs(moved).max() < 2e-4  # of 20 mm and 0.1 rad
+    assert isinstance(found, RobotState)
+    assert found.time == state.time

@@ -1,0 +1,42 @@
+"""Commands that act late, on ground that is slippery, with a load: each alone holds, and all do."""
+
+from __future__ import annotations
+
+import pytest
+
+from controller.sweeps.trials import TrialRobot
+from go2_wbc.plant import MujocoPlant
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sensors", ["ideal", "imu"])
+@pytest.mark.parametrize(
+    ("friction", "payload", "speed"), [(0.2, 0.0, 1.0), (0.3, 4.0, 0.5), (0.2, 4.0, 1.0)]
+)
+def test_a_robot_whose_commands_are_late_walks_on_slippery_ground_with_a_load(
+    friction: float, payload: float, speed: float, sensors: str
+) -> None:
+    """It fell within its first second, 20 of 20 times."""
+    plant = MujocoPlant(friction=friction, payload=payload, delay=0.01, sensors=sensors)
+    with TrialRobot(plant) as robot:
+        robot.require(robot.go2.stand())
+        robot.require(robot.go2.walk())
+        robot.go2.move(speed)
+        robot.wait(4.0)
+        robot.go2.stop()
+        robot.require(robot.go2.last_outcome.ok)
+        robot.require(robot.go2.stand())
+
+
+def test_what_a_walk_has_shown_of_the_ground_is_known_to_the_next() -> None:
+    with TrialRobot(MujocoPlant(friction=0.2)) as robot:
+        known = []
+        for _ in range(2):
+            robot.require(robot.go2.walk())
+            robot.go2.move(0.5)
+            robot.wait(0.1)
+            known.append(robot.go2._pilot._walker.walking.friction)
+            robot.wait(1.9)
+            robot.go2.stop()
+            robot.require(robot.go2.stand())
+        assert known[1] < known[0]
