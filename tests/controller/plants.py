@@ -76,7 +76,7 @@ class WatchedPlant(Plant):
 
 
 class StillPlant(Plant):
-    """A robot that lies still whatever it is told; only its clock goes on."""
+    """A robot that lies still whatever its motors do, in vain; only its clock goes on."""
 
     def __init__(self, period: float = PERIOD) -> None:
         self._period = period
@@ -96,7 +96,9 @@ class StillPlant(Plant):
         self.on_write()
         self.commands.append(command)
         if not self.is_clock_standing:
-            self.state = replace(self.state, time=self.state.time + self._period)
+            pull = command.kp * (command.q_des - self.state.joint_positions)
+            tau = command.tau + pull + command.kd * command.v_des
+            self.state = replace(self.state, time=self.state.time + self._period, tau=tau)
 
     def close(self) -> None: ...
 

@@ -19,7 +19,6 @@ from tests.controller.plants import MID_RISE, PERIOD, StillPlant, WatchedPlant, 
 
 @pytest.mark.parametrize("call", ["stand", "sit", "walk"])
 def test_a_robot_that_does_not_move_never_gets_a_yes(call: str) -> None:
-    # This plant lies still for ever, whatever it is told.
     with GO2Controller(plant=StillPlant()) as go2:
         assert getattr(go2, call)() is False
         assert go2.last_outcome.reason.startswith("stand not done within 3.0 s: base height [m]")

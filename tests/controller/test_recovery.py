@@ -14,7 +14,7 @@ from controller.checks import unfolded_legs
 from go2_wbc.legs import Leg
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.state import JointCommand
+from go2_wbc.robot.state import JointCommand, RobotState
 from motions.postures import TUCKED_JOINTS
 from tests.controller.plants import PERIOD, WatchedPlant
 from tests.engine_helpers import state_of
@@ -42,11 +42,21 @@ def wrapped() -> WatchedPlant:
 
 
 class LamePlant(WatchedPlant):
-    """A robot whose left rear leg does nothing."""
+    """A robot whose left rear leg does nothing, though its motors say that they work."""
+
+    _asked = np.zeros(3)
+
+    def read(self) -> RobotState:
+        state = super().read()
+        tau = state.tau.copy()
+        tau[Leg.RL.joints] = self._asked
+        return replace(state, tau=tau)
 
     def write(self, command: JointCommand) -> None:
         works = np.ones(12)
         works[Leg.RL.joints] = 0.0
+        off = command.q_des - self.inner.read().joint_positions
+        self._asked = (command.tau + command.kp * off)[Leg.RL.joints]
         tau, kp, kd = works * command.tau, works * command.kp, works * command.kd
         super().write(replace(command, tau=tau, kp=kp, kd=kd))
 
