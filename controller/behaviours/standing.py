@@ -32,7 +32,7 @@ from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.locomotion import LEAST_HEIGHT, LocomotionConfig
-from go2_wbc.planning.slip import FIRST, MOST
+from go2_wbc.planning.slip import MOST
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
@@ -103,7 +103,7 @@ class Standing(ChangePosture):
             position_leash=SHORT_LEASH,
             mpc=mpc,
         )
-        is_slippery = friction is not None and friction < FIRST
+        is_slippery = friction is not None and friction < config.ground_friction
         self._friction_of_steps = friction if is_slippery else MOST
         self._steps: Walking | None = None
 

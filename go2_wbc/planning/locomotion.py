@@ -41,7 +41,7 @@ from go2_wbc.planning.rest import (
     start_stepping,
     why_not_resting,
 )
-from go2_wbc.planning.slip import FIRST, LEAST, MOST, Slip, observe_slip
+from go2_wbc.planning.slip import LEAST, MOST, Slip, observe_slip
 from go2_wbc.planning.swing import Swing, begin_swing, resume_swing, swing_foot
 from go2_wbc.planning.trunk import (
     Command,
@@ -250,7 +250,9 @@ class LocomotionPlanner:
             trunk=Trunk(yaw=snapshot.state.yaw, position=snapshot.p_world_com[:2]),
             rest=Rest(place=snapshot.p_world_com[:2], middle=snapshot.p_world_feet.mean(axis=0)),
             ground=ground_below(snapshot, self._model.foot_radius),
-            slip=Slip(friction=min(FIRST if friction is None else friction, MOST)),
+            slip=Slip(
+                friction=min(self._config.ground_friction if friction is None else friction, MOST)
+            ),
             feet=feet,
             planned=PlannedForces(next=-np.inf),
         )

@@ -1,8 +1,10 @@
 """Friction of the ground, from feet that slide.
 
-Of ground on which the robot has not walked yet nothing is known. The estimate begins low there, and
-rises as it steps and nothing slides: a walk that began with 0.6 slid at once on a friction of 0.2,
-and where commands act 10 ms late as well it fell in its first second.
+Of ground on which the robot has not walked yet nothing is known. The estimate begins low there
+(``LocomotionConfig.ground_friction``), and rises as it steps and nothing slides: a walk that began
+with 0.6 slid at once on a friction of 0.2, and where commands act 10 ms late as well it fell in its
+first second. With 0.35 it fell on its own sensors; with 0.2 it follows a curve as it begins by
+0.03 m/s less exactly than with 0.6, and withstands the same pushes.
 
 A foot that carries load and slides has less friction than it was counted on. While one does, the
 estimate falls towards what that foot shows, and otherwise it recovers, slowly:
@@ -46,10 +48,6 @@ TIME_CONSTANT, RECOVERY = 0.03, 0.1
 """Time constant [s] of the fall, and rate [1/s] of the rise."""
 LEAST, MOST = 0.12, 0.6
 """Bounds of the estimate."""
-FIRST = 0.2
-"""Where it begins on ground of which nothing is known. With 0.35 a robot on its own sensors fell on
-a friction of 0.2 with 10 ms; with this it follows a curve as it begins by 0.03 m/s less exactly than
-with 0.6, and withstands the same pushes."""
 HALF_SPEED = 0.5
 """Speed [m/s] of a sliding contact point at which the ground bears half of the force along it that
 the torques make."""

@@ -67,6 +67,8 @@ class LocomotionConfig:
             which a standing robot starts to step.
         square_tolerance: distance [m] of a foot from below its hip at which the robot stands
             squarely enough to stop stepping.
+        ground_friction: of the ground until the robot has walked on it; feet that slide, and feet
+            that do not, change what is believed, and the next walk begins with that.
         swing: shape of the swing.
         mpc: planning of the forces ahead.
         pose: how a new pose of the trunk is approached.
@@ -86,6 +88,7 @@ class LocomotionConfig:
     settle_speed: float = 0.05
     capture_margin: float = 0.09
     square_tolerance: float = 0.02
+    ground_friction: float = 0.2
     swing: SwingConfig = field(default_factory=SwingConfig)
     mpc: MpcConfig = field(default_factory=MpcConfig)
     pose: PoseConfig = field(default_factory=PoseConfig)

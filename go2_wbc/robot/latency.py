@@ -6,7 +6,8 @@ is what was asked of them ``d + 1`` ticks before, so ``d`` is the lag at which t
     e_d' = (|tau - tau_asked[d]|^2 - e_d) / T,      d = argmin e_d
 
 As long as torques hardly change all lags fit alike and the last one found stays: another must fit
-better by a share of how much the torques themselves have changed.
+better by a share of how much the torques themselves have changed. Nor do motors tell of any that do
+something else.
 
 What the whole-body controller has asked for and what has not acted yet, it has also foretold: its
 accelerations. The state is carried on by them, v_i+1 = v_i + dt a_i, and the next torques are found
@@ -36,6 +37,8 @@ MEMORY = 0.2
 """Time [s] over which misfits are averaged."""
 BETTER = 0.01
 """Share of the torques' own change by which another lag must fit better."""
+WORST_FIT = 0.5
+"""Share of that change up to which a lag may be off: motors that do not obey tell of none."""
 LEAST_CHANGE = 1e-3
 """Mean square [N^2 m^2] of that change below which it says nothing."""
 
@@ -94,7 +97,8 @@ def observe_lag(s: Lag, tau: Foreign[Float[np.ndarray, "12"]], dt: float) -> Non
         if s.misfit[d] < s.misfit[best]:
             best = d
     gained = s.misfit[int(s.ticks)] - s.misfit[best]
-    if s.change > LEAST_CHANGE and gained > BETTER * s.change:
+    fits = s.misfit[best] < WORST_FIT * s.change
+    if s.change > LEAST_CHANGE and fits and gained > BETTER * s.change:
         s.ticks = best
 
 

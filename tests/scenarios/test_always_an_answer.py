@@ -39,15 +39,17 @@ def test_contradictions_are_answered_and_never_damp_an_upright_robot(
     assert values[f"{name}.grave"] <= GRAVE
 
 
-@pytest.mark.parametrize(("seed", "time"), [(0, 2.3), (7, 2.3)])
+@pytest.mark.parametrize(("seed", "time"), [(0, 2.3), (1, 2.3)])
 def test_a_hip_at_its_stop_for_a_moment_does_not_damp_a_robot_that_is_pushed(
     seed: int, time: float
 ) -> None:
     """They were damped after 0.02 s; left alone they step on.
 
-    The attitude keeps its weight, or no hip comes to its stop.
+    The attitude keeps its weight, and the ground is known to hold, or no hip comes to its stop.
     """
-    config = Config(locomotion=LocomotionConfig(mpc=MpcConfig(throw_speed=1e9)))
+    config = Config(
+        locomotion=LocomotionConfig(ground_friction=0.6, mpc=MpcConfig(throw_speed=1e9))
+    )
     with TrialRobot(plant_of(Trial(seed, sensors="imu"), 7100, UNTOLD), config) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())

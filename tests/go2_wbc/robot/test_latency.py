@@ -56,6 +56,16 @@ def test_torques_that_do_not_change_tell_nothing() -> None:
     assert latency.delay == pytest.approx(4 * PERIOD)
 
 
+def test_motors_that_do_not_obey_tell_nothing() -> None:
+    """A robot that lay still whatever it was told was taken to move at 0.5 m/s."""
+    latency, rng = Latency(PERIOD), np.random.default_rng(8)
+    state = helpers.state_of(helpers.standing_q())
+    for tau in 10.0 + jagged(rng, 500, step=0.1):
+        latency.ahead(replace(state, tau=np.zeros(12)))
+        latency.note(tau, STILL)
+    assert latency.delay == 0.0
+
+
 def test_a_state_is_left_alone_where_commands_act_at_once() -> None:
     latency, state = Latency(PERIOD), helpers.random_state(np.random.default_rng(4))
     followed(latency, jagged(np.random.default_rng(5), 100), 0)
