@@ -238,6 +238,7 @@ class LocomotionPlanner:
             snapshot: of this tick.
             friction: of the ground, as it is known; None if nothing is.
         """
+        known = self._config.ground_friction if friction is None else friction
         feet = [
             Foot(
                 contact=FootContact(since=np.inf, was_stance=True),
