@@ -22,9 +22,8 @@ import numpy as np
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output
-from viz.palette import ACCENT, MUTED, TIGHT
-from viz.render.figure_style import PLOT_SUFFIXES, save_figure
-from viz.render.speed_plot import SpeedLine, SpeedPanel, speed_figure
+from viz.render.evidence_plot import SpeedLine, SpeedPanel, speed_figure
+from viz.style import ACCENT, MUTED, PLOT_SUFFIXES, TIGHT, save_figure
 
 MARK, END = "<!-- evidence:", "<!-- evidence:end -->"
 """What stands above a table, with its name, and below it."""

@@ -21,11 +21,10 @@ from go2_wbc.errors import MotionError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.recording import Recording
 from motions import Motion, Timeline, find_motion, motion_names
-from viz.palette import INK
 from viz.render.animation import encoded_webp, frame_times
 from viz.render.frame_renderer import FrameRenderer, ShotStyle
-from viz.render.posed_robot import PosedRobot
-from viz.render.robot_meshes import load_robot_visuals
+from viz.render.robot_meshes import PosedRobot, load_robot_visuals
+from viz.style import INK
 
 MOMENTS = 3
 """Panels in a line; a long motion has two lines of them."""

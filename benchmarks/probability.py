@@ -25,8 +25,8 @@ from controller.sweeps.rows import Row
 from controller.sweeps.summary import rate_interval
 from go2_wbc.files import checked_output, write_atomically
 from motions.feasibility.probability import FILE, ProbabilityModel, fitted
-from viz.render.figure_style import PLOT_SUFFIXES, save_figure
-from viz.render.reliability_plot import reliability_figure
+from viz.render.evidence_plot import reliability_figure
+from viz.style import PLOT_SUFFIXES, save_figure
 
 FITTED = (TRAIN, DRAWN)
 """What the model may be fitted to."""

@@ -26,7 +26,7 @@ from go2_wbc.plant import MujocoPlant, Plant
 from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.state import Health, RobotState
 from go2_wbc.wbc.tasks import Task
 
 _log = logging.getLogger(__name__)
@@ -287,6 +287,11 @@ class GO2Controller:
         """
         self._check_open()
         self._pilot.return_safely()
+
+    @property
+    def health(self) -> Health:
+        """Which parts of the robot were found to be broken; ``print(go2.health)`` names them."""
+        return self._runner.loop.health
 
     @property
     def progress(self) -> float:

@@ -23,11 +23,12 @@ from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible
 from go2_wbc.plant.base import Plant
 from go2_wbc.reference import JointReference, Reference, Target, sag_and_lean
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.motor_watch import MotorWatch
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.payload_estimation import PayloadEstimator
 from go2_wbc.robot.safety import FallDetector, SafetyConfig, is_plausible
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.robot.state import JointCommand, RobotState
+from go2_wbc.robot.state import Health, JointCommand, RobotState
 from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.relaxation import is_grave
 from go2_wbc.wbc.solution import WbcSolution
@@ -57,6 +58,7 @@ class ControlLoop:
         behaviour: what the robot does now.
         snapshot: of the last tick.
         fault: why the last behaviour was ended by the loop, or None.
+        health: which parts are broken.
         warn: writes a line of the log, as ``logging.Logger.warning`` does.
     """
 
@@ -96,6 +98,8 @@ class ControlLoop:
             raise PlantError(f"the first state of the plant is not finite: q={self.state.q}")
         self.snapshot: Snapshot = model.snapshot(self.state)
         self._payloads = payloads
+        self._motors = MotorWatch(model.motor)
+        self.health = Health()
         self._last_command = JointCommand.damping(DAMPING)
         self._unanswered = 0
         self._qp_failures_in_a_row, self._grave_since = 0, inf
@@ -143,7 +147,9 @@ class ControlLoop:
                 as the plant still obeys, and the fault is noted; so for any other exception.
         """
         try:
-            self._observe()
+            if self._observe():
+                self._motors.update(self._last_command, self.state, self.plant.control_period)
+            self._look_after_parts()
             self._guard()
             self._feel()
             target = self.behaviour.update(self.snapshot)
@@ -159,18 +165,32 @@ class ControlLoop:
             raise
         self.telemetry.record(self.snapshot, target.stance, self.behaviour.label)
 
-    def _observe(self) -> None:
+    def _observe(self) -> bool:
+        """Read the plant; returns whether there is a new state."""
         state = self.plant.read()
         is_finite = _is_plausible(state)
         if is_finite and state.time > self.state.time:
             self._unanswered = 0
             self.state = state
             self.snapshot = self.model.snapshot(state, self._payload_of(self.behaviour))
-            return
+            return True
         silence = self._unanswered * self.plant.control_period
         if silence > self._safety.stale_limit:
             lack = "new" if is_finite else "finite"
             raise PlantTimeout(f"no {lack} state from the plant for {1000 * silence:.0f} ms")
+        return False
+
+    def _look_after_parts(self) -> None:
+        """Say what has broken; a robot that cannot stand without it goes limp before it falls."""
+        faults = (*self.plant.sensor_faults, *self._motors.faults)
+        if len(faults) != len(self.health.faults):
+            for fault in set(faults) - set(self.health.faults):
+                self.warn("%s", fault)
+            self.health = Health(faults)
+        if faults and self.fault is None and self.behaviour.needs_balance:
+            grave = [str(fault) for fault in faults if not fault.is_survived]
+            if grave:
+                self.abandon(Fault("; ".join(grave), may_fall=True))
 
     def _payload_of(self, behaviour: Behaviour) -> Payload:
         """What ``behaviour`` is to know of what the robot carries."""

@@ -10,10 +10,10 @@ if TYPE_CHECKING:
     from viz.content import Annotation, MarginCurve, ReplayContent, Verdict
     from viz.render.animation import ANIMATION_SUFFIXES, export_animation
     from viz.render.distribution_plot import export_distributions
-    from viz.render.figure_style import PLOT_SUFFIXES
     from viz.render.margin_plot import export_plot, margin_figure
     from viz.render.still import export_filmstrip
     from viz.replay.html_page import HTML_SUFFIXES, export_html
+    from viz.style import PLOT_SUFFIXES
 
 __all__ = [
     "ANIMATION_SUFFIXES",

@@ -8,7 +8,7 @@ import sys
 from benchmarks.bridges import ros2, unitree
 from benchmarks.command import Benchmark, run_and_report
 from benchmarks.study import chosen_studies, tasks_of
-from controller.bridges.unitree.extra import require_dds
+from controller.bridges.unitree import require_dds
 from go2_wbc.errors import CommandError, MissingDependency
 
 STUDIES = (ros2.STUDY, *unitree.STUDIES)

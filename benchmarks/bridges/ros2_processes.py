@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
 from benchmarks.bridges.processes import PROGRAM, Process
-from controller.bridges.ros2.names import (
+from controller.bridges.ros2 import (
     BEHAVIOR_SERVICE,
     CMD_VEL,
     COMMAND_PERIOD,

@@ -13,9 +13,9 @@ import numpy as np
 from benchmarks.bridges.processes import require, wait_until
 from benchmarks.bridges.unitree_processes import MOVE, SPEED, Scene, driver, good_commands, scene
 from benchmarks.study import Direction, Measurement, Metric, Study
-from controller.bridges.unitree import layout
-from controller.bridges.unitree.codec import decode_message, encode_message
+from controller.bridges.unitree import messages
 from controller.bridges.unitree.low_level import intact_message, low_cmd_message
+from controller.bridges.unitree.messages import decode_message, encode_message
 from controller.bridges.unitree.sport_api import Api
 from controller.sweeps.trials import Trial
 from go2_wbc.robot.state import JointCommand
@@ -102,8 +102,8 @@ def measure_stream(_trial: Trial) -> Measurement:
         while time.monotonic() - start < STREAM_TIME:
             states.wait(0.1)
             for data in states.take():
-                message = decode_message(layout.LOW_STATE, data)
-                bad += not layout.is_intact(message)
+                message = decode_message(messages.LOW_STATE, data)
+                bad += not messages.is_intact(message)
                 ticks.append(int(message["tick"][0]))
                 commands.write(encode_message(low_cmd_message(DAMPED)))
                 sent += 1
@@ -124,13 +124,13 @@ def measure_stream(_trial: Trial) -> Measurement:
 
 def codec_time() -> float:
     """CPU time [us] of one lowcmd made, sealed and encoded, one lowstate decoded and checked."""
-    state = layout.new_message(layout.LOW_STATE)
-    layout.seal(state)
+    state = np.zeros(1, messages.LOW_STATE)
+    messages.seal(state)
     data = encode_message(state)
 
     def code() -> None:
         encode_message(low_cmd_message(DAMPED))
-        intact_message(layout.LOW_STATE, data)
+        intact_message(messages.LOW_STATE, data)
 
     return 1e6 / CODINGS * timeit.timeit(code, timer=time.process_time, number=CODINGS)
 

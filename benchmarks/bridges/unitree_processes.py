@@ -16,8 +16,7 @@ import numpy as np
 from jaxtyping import Shaped
 
 from benchmarks.bridges.processes import PROGRAM, START_LIMIT, Process, wait_until
-from controller.bridges.unitree.codec import decode_message
-from controller.bridges.unitree.layout import SPORT_STATE
+from controller.bridges.unitree.messages import SPORT_STATE, decode_message
 from controller.bridges.unitree.sport_api import (
     SPORT_SERVICE,
     Api,

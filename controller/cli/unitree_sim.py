@@ -49,7 +49,7 @@ def register(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until a signal comes."""
-    from controller.bridges.unitree.extra import require_dds
+    from controller.bridges.unitree import require_dds
 
     require_dds()
     from controller.bridges.unitree.simulator import SimulatorSettings, UnitreeSimulator

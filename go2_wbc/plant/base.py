@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-from go2_wbc.robot.state import JointCommand, RobotState
+from go2_wbc.robot.state import JointCommand, PartFault, RobotState
 
 
 class Plant(ABC):
@@ -35,6 +35,11 @@ class Plant(ABC):
     def body_contact_force(self) -> float | None:
         """Normal force [N] of the ground on all but the feet; None of a plant that cannot tell."""
         return None
+
+    @property
+    def sensor_faults(self) -> tuple[PartFault, ...]:
+        """Sensors that were found to be broken; a plant that does not look says none."""
+        return ()
 
     @abstractmethod
     def read(self) -> RobotState:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, final
@@ -11,9 +11,9 @@ from typing import Any, final
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.robot.estimator import EstimatorConfig, SensorReading, StateEstimator
+from go2_wbc.robot.estimator import EstimatorConfig, StateEstimator
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.state import OdometryCovariance, RobotState
+from go2_wbc.robot.state import OdometryCovariance, PartFault, RobotState, SensorReading
 from go2_wbc.validation import NOT_NEGATIVE, ranged
 
 EXACT = 1e-4
@@ -169,16 +169,26 @@ class Proprioception:
         self._estimator = StateEstimator(self._model, self._config)
         self._waiting: deque[SensorReading] = deque()
 
-    def sense(self, true: RobotState, imu: ImuSample) -> tuple[RobotState, ImuSample]:
+    def sense(
+        self,
+        true: RobotState,
+        imu: ImuSample,
+        broken: Callable[[SensorReading], SensorReading] = lambda reading: reading,
+    ) -> tuple[RobotState, ImuSample]:
         """The estimated state and the IMU's reading, at the time of ``true``.
 
-        Call it once in every control period.
+        Call it once in every control period. ``broken``: what broken sensors make of a reading.
         """
-        self._waiting.append(self._read(true, imu))
+        self._waiting.append(broken(self._read(true, imu)))
         late = len(self._waiting) > self._late
         reading = replace(self._waiting.popleft() if late else self._waiting[0], time=true.time)
         state = self._estimator.update(reading)
         return state, ImuSample(state.q[3:7], reading.gyro, reading.accelerometer)
+
+    @property
+    def faults(self) -> tuple[PartFault, ...]:
+        """Sensors that were found to be broken."""
+        return self._estimator.watch.faults
 
     @property
     def covariance(self) -> OdometryCovariance:

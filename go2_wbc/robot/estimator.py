@@ -76,6 +76,7 @@ from go2_wbc.robot.rest_detection import (
     lies,
     take_in_rest,
 )
+from go2_wbc.robot.sensor_watch import SensorWatch
 from go2_wbc.robot.state import OdometryCovariance, RobotState, SensorReading
 from go2_wbc.robot.state_filter import (
     ERROR,
@@ -101,6 +102,8 @@ _START_DEVIATIONS = (0.001, 0.1, 0.01)
 the origin by definition."""
 _THROWN_DEVIATIONS, _THROWN_TILT = (0.001, 2.0, 1.0), 1.0
 """The same of a robot that falls, or is thrown, and of its roll and pitch [rad]."""
+_DOUBTED_TILT, _DOUBTED_SPEED = 0.05, 0.2
+"""Deviations of roll and pitch [rad] and of the velocity [m/s] after the gyro has erred a while."""
 _STEADY_HEADING = 1e-4
 """Deviation [rad] of the heading when the filter begins: it is 0 by definition."""
 
@@ -247,7 +250,11 @@ def estimate(
 
 
 class StateEstimator:
-    """Turns sensor readings into ``RobotState``; the world's origin is where the base was first."""
+    """Turns sensor readings into ``RobotState``; the world's origin is where the base was first.
+
+    Attributes:
+        watch: what puts readings right that contradict the others, and names the broken part.
+    """
 
     def __init__(self, model: RobotModel, config: EstimatorConfig | None = None) -> None:
         """Estimate the state of ``model``'s robot."""
@@ -265,9 +272,13 @@ class StateEstimator:
         self._reading, self._state = packed(reading), EstimatorState()
         self._x, self._P = self._state.filter.x, self._state.filter.P
         self._x.quaternion[3] = 1.0
+        self.watch = SensorWatch(model)
 
     def update(self, reading: SensorReading) -> RobotState:
         """Take in a reading that is newer than the last one; returns the state at its time."""
+        reading = self.watch.checked(reading, self._x.quaternion)
+        if (turn := self.watch.misturned) is not None:
+            self._turn_back(turn)
         step = reading.time - self._time
         if not 0.0 <= step <= self._config.longest_step:
             self._begin(reading)
@@ -286,6 +297,14 @@ class StateEstimator:
             foot_forces=reading.foot_forces,
             feet_in_contact=reading.foot_forces > self._config.contact_force,
         )
+
+    def _turn_back(self, turn: Array3) -> None:
+        """Take back a turn [rad] in the base frame that was none, and doubt tilt and velocity."""
+        R = pin.Quaternion(self._x.quaternion).toRotationMatrix() @ pin.exp3(-turn)
+        self._x.quaternion[:] = pin.Quaternion(R).coeffs()
+        for first, count, deviation in ((THETA, 2, _DOUBTED_TILT), (VELOCITY, 3, _DOUBTED_SPEED)):
+            doubted = range(first, first + count)
+            self._P[doubted, doubted] += deviation**2
 
     def _read(self, reading: SensorReading) -> None:
         taken = self._reading

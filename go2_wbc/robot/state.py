@@ -105,6 +105,45 @@ class SensorReading:
 
 
 @dataclass(frozen=True, slots=True)
+class PartFault:
+    """A part of the robot that is broken.
+
+    Attributes:
+        part: its name, as ``FL_calf_joint``, ``FL_foot``, ``gyro``.
+        what: is the matter with it, in plain words.
+        is_survived: whether the robot can go on.
+        since: robot time [s] at which it was noticed.
+    """
+
+    part: str
+    what: str
+    is_survived: bool
+    since: float
+
+    def __str__(self) -> str:
+        return f"{self.part} {self.what} (since {self.since:.2f} s)"
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """What of a robot is broken.
+
+    Attributes:
+        faults: in the order in which they were noticed; empty if it seems sound.
+    """
+
+    faults: tuple[PartFault, ...] = ()
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether nothing was found to be broken."""
+        return not self.faults
+
+    def __str__(self) -> str:
+        return "; ".join(map(str, self.faults)) or "sound"
+
+
+@dataclass(frozen=True, slots=True)
 class OdometryCovariance:
     """How sure a state is of the base: of its errors, as ``nav_msgs/Odometry`` has them.
 

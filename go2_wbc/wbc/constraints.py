@@ -25,27 +25,21 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import MotorModel, torque_range
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.config import WbcConfig
-from go2_wbc.wbc.problem import FORCES, SIZE, Bounds, Rows
+from go2_wbc.wbc.problem import FORCES, SIZE, Bounds, Rows, Source
 
 _JOINT_SELECTION = np.eye(12, SIZE, 6)
 
 
-class Equality(ABC):
+class Equality(Source, ABC):
     """A hard goal."""
-
-    name: str
-    unit: str
 
     @abstractmethod
     def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
         """Rows E z = e of this constraint now."""
 
 
-class Inequality(ABC):
+class Inequality(Source, ABC):
     """A hard limit."""
-
-    name: str
-    unit: str
 
     @abstractmethod
     def bounds(self, snapshot: Snapshot, reference: Reference) -> Bounds:

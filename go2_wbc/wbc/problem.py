@@ -16,7 +16,7 @@ frame (4 x 3). The force of a foot in swing is no unknown: back ends leave its c
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol, TypeVar, runtime_checkable
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -49,19 +49,11 @@ class Bounds(NamedTuple):
     upper: Float[np.ndarray, " k"]
 
 
-@runtime_checkable
-class Source(Protocol):
-    """A task or a constraint, as a residual table names it."""
+class Source:
+    """A task or a constraint: what a residual table calls it, and the unit of its rows."""
 
-    @property
-    def name(self) -> str:
-        """What it is called."""
-        ...
-
-    @property
-    def unit(self) -> str:
-        """Unit of its rows."""
-        ...
+    name: str
+    unit: str
 
 
 @dataclass(frozen=True, slots=True)

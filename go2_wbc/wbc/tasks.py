@@ -26,7 +26,7 @@ from go2_wbc.reference import JOINTS, STANCE, SWING, Reference, Target
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.config import Gains, WbcConfig
 from go2_wbc.wbc.loads import plan_loads
-from go2_wbc.wbc.problem import SIZE, Rows
+from go2_wbc.wbc.problem import SIZE, Rows, Source
 
 LARGEST_ERROR = 3.0
 """Orientation error [rad] beyond which its sine says little about it."""
@@ -40,11 +40,9 @@ LEG_ROWS = 6
 """The first row of the first leg."""
 
 
-class Task(ABC):
+class Task(Source, ABC):
     """One soft goal with a weight."""
 
-    name: str
-    unit: str
     weight: float
 
     @abstractmethod

@@ -10,14 +10,6 @@ from typing import Any
 
 import numpy as np
 
-_TYPES = {
-    "Float32Array": np.float32,
-    "Uint32Array": np.uint32,
-    "Uint16Array": np.uint16,
-    "Int8Array": np.int8,
-    "Uint8Array": np.uint8,
-}
-
 
 def packed_parts(page: str) -> dict[str, bytes]:
     """The unpacked contents of the page's data blocks, by id."""
@@ -40,7 +32,8 @@ def read_pack(content: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     arrays = {}
     for name, entry in header["arrays"].items():
         count = int(np.prod(entry["shape"]))
-        raw = np.frombuffer(content, _TYPES[entry["type"]], count, start + entry["offset"])
+        kind = np.dtype(entry["type"].removesuffix("Array").lower())
+        raw = np.frombuffer(content, kind, count, start + entry["offset"])
         array = raw.reshape(entry["shape"])
         if "low" in entry:
             array = np.array(entry["low"]) + np.array(entry["scale"]) * array

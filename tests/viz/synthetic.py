@@ -13,35 +13,33 @@ _LINK = 0.213  # [m] length of thigh and calf
 _STEP, _PERIOD, _DUTY, _APEX = 0.16, 0.5, 0.6, 0.07  # [m], [s], -, [m]
 _STAND = 0.29  # [m] from hip axis to foot centre
 _WEIGHT = 157.8  # [N]
-_SCRIPT = (("stand", 2.0), ("walk", 6.0), ("stand", 1.5), ("high_five", 4.0), ("sit", 2.5))
+_RATE = 100.0  # [Hz]
 
 
-def synthetic_recording(
-    *, rate: float = 100.0, script: tuple[tuple[str, float], ...] = _SCRIPT
-) -> Recording:
-    """Stand, trot forward on a curve, raise the right paw, crouch."""
+def synthetic_recording(*, script: tuple[tuple[str, float], ...]) -> Recording:
+    """``stand``, trot forward on a curve, raise the right paw, crouch, each for so many seconds."""
     robot = RobotModel()
     limits = robot.torque_limits
     ends = np.cumsum([seconds for _, seconds in script])
-    time = np.arange(0.0, ends[-1], 1 / rate)
+    time = np.arange(0.0, ends[-1], 1 / _RATE)
     which = np.minimum(np.searchsorted(ends, time, side="right"), len(script) - 1)
     labels = tuple(script[i][0] for i in which)
     into = time - np.concatenate([[0.0], ends])[which]
     walking = np.array([label == "walk" for label in labels])
     speed = np.where(walking, _STEP / (_DUTY * _PERIOD), 0.0)
-    yaw = np.cumsum(np.where(walking, 0.15, 0.0)) / rate
-    x, y = np.cumsum(speed * np.cos(yaw)) / rate, np.cumsum(speed * np.sin(yaw)) / rate
+    yaw = np.cumsum(np.where(walking, 0.15, 0.0)) / _RATE
+    x, y = np.cumsum(speed * np.cos(yaw)) / _RATE, np.cumsum(speed * np.sin(yaw)) / _RATE
     q = np.zeros((len(time), 19))
     q[:, 0], q[:, 1], q[:, 5], q[:, 6] = x, y, np.sin(yaw / 2), np.cos(yaw / 2)
     stance = np.ones((len(time), 4), dtype=bool)
-    com, margin = np.zeros((len(time), 3)), np.full(len(time), np.nan)
+    com = np.zeros((len(time), 3))
     for k, label in enumerate(labels):
         duration = script[which[k]][1]
         q[k, 7:], stance[k] = _posture(label, into[k], duration)
         _, feet = robot.forward_kinematics(q[k])
         q[k, 2] += FOOT_RADIUS - feet[:, 2].min()
-        com[k], feet = robot.forward_kinematics(q[k])
-        margin[k] = _margin(com[k, :2], feet[stance[k], :2])
+        com[k], _ = robot.forward_kinematics(q[k])
+    margin = np.where(stance.sum(axis=1) < 3, np.nan, 0.05)
     forces = np.where(stance, _WEIGHT / stance.sum(axis=1, keepdims=True), 0.0)
     forces *= 1 + 0.15 * np.sin(40 * time)[:, None]
     wave = np.sin(2 * np.pi * time / _PERIOD)[:, None]
@@ -81,12 +79,3 @@ def _posture(label: str, t: float, duration: float) -> tuple[Float[np.ndarray, "
 def _leg_angles(forward: float, height: float) -> Float[np.ndarray, "3"]:
     bend = np.arccos(np.hypot(forward, height) / (2 * _LINK))
     return np.array([0.0, np.arctan2(-forward, height) + bend, -2 * bend])
-
-
-def _margin(point: Float[np.ndarray, "2"], feet: Float[np.ndarray, "k 2"]) -> float:
-    if len(feet) < 3:
-        return float("nan")
-    around = feet[np.argsort(np.arctan2(*(feet - feet.mean(axis=0)).T[::-1]))]
-    edges = np.roll(around, -1, axis=0) - around
-    inward = np.column_stack([-edges[:, 1], edges[:, 0]]) / np.linalg.norm(edges, axis=1)[:, None]
-    return float(np.min(np.einsum("ij,ij->i", inward, point - around)))

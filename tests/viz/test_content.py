@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -12,30 +13,26 @@ from go2_wbc.recording import Recording
 from viz.content import check_recording
 
 
-def _first(recording: Recording, count: int) -> Recording:
-    fields = {name: getattr(recording, name)[:count] for name in Recording.__slots__}
-    return Recording(**fields)
+def _changed(recording: Recording, name: str, row: int, value: float) -> Recording:
+    values = getattr(recording, name).copy()
+    values[row] = value
+    return replace(recording, **{name: values})
 
 
-def test_a_recording_with_one_sample_is_refused(recording: Recording) -> None:
-    with pytest.raises(ConfigError, match="1 samples; at least 2"):
-        check_recording(_first(recording, 1))
-
-
-def test_times_that_do_not_increase_are_refused(recording: Recording) -> None:
-    time = recording.time.copy()
-    time[5] = time[4]
-    with pytest.raises(ConfigError, match="must increase"):
-        check_recording(replace(recording, time=time))
-
-
-def test_a_configuration_that_is_not_finite_is_refused_with_its_time(recording: Recording) -> None:
-    q = recording.q.copy()
-    q[7, 9] = np.nan
-    with pytest.raises(ConfigError, match=r"t=1\.070 s"):
-        check_recording(replace(recording, q=q))
-
-
-def test_labels_of_another_length_are_refused(recording: Recording) -> None:
-    with pytest.raises(ConfigError, match=r"labels has 1 samples"):
-        check_recording(replace(recording, labels=("stand",)))
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (
+            lambda r: Recording(*(getattr(r, n)[:1] for n in Recording.__slots__)),
+            "1 samples; at least 2",
+        ),
+        (lambda r: _changed(r, "time", 5, r.time[4]), "must increase"),
+        (lambda r: _changed(r, "q", 7, np.nan), r"not finite at t=1\.070 s"),
+        (lambda r: replace(r, labels=("stand",)), r"labels has 1 samples"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(
+    recording: Recording, change: Callable[[Recording], Recording], why: str
+) -> None:
+    with pytest.raises(ConfigError, match=why):
+        check_recording(change(recording))

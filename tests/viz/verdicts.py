@@ -6,6 +6,8 @@ import numpy as np
 
 from viz.content import Annotation, MarginCurve, Verdict
 
+_TEXT = "1.2, limit 1 <b>"
+
 
 def made_up_verdict(duration: float) -> Verdict:
     """A calf over its limit in the middle fifth, the CoM at one instant, friction tight."""
@@ -20,9 +22,9 @@ def made_up_verdict(duration: float) -> Verdict:
         ok=False,
         text="2 limits broken, 1 tight margin",
         annotations=(
-            _annotation("support", "CoM", instant, ((instant, instant),), ("com",)),
-            _annotation("joint position", "FR_calf", duration / 2, spans, ("FR_calf",)),
-            _annotation("friction", "RL", 0.0, ((0.0, 0.1),), ("RL_foot",), is_broken=False),
+            Annotation("support", "CoM", instant, _TEXT, True, ((instant, instant),), ("com",)),
+            Annotation("joint position", "FR_calf", duration / 2, _TEXT, True, spans, ("FR_calf",)),
+            Annotation("friction", "RL", 0.0, _TEXT, False, ((0.0, 0.1),), ("RL_foot",)),
         ),
         curves=(
             _curve("torque", "N m", time, np.full(400, 9.0)),
@@ -32,18 +34,6 @@ def made_up_verdict(duration: float) -> Verdict:
             _curve("entry and exit", "m", np.array([0.0, duration]), np.array([np.inf, -np.inf])),
         ),
     )
-
-
-def _annotation(
-    limit: str,
-    subject: str,
-    time: float,
-    spans: tuple[tuple[float, float], ...],
-    parts: tuple[str, ...],
-    *,
-    is_broken: bool = True,
-) -> Annotation:
-    return Annotation(limit, subject, time, "1.2, limit 1 <b>", is_broken, spans, parts)
 
 
 def _curve(

@@ -38,7 +38,7 @@ def export_animation(
     size: tuple[int, int] = (640, 400),
     progress: Callable[[float], None] | None = None,
 ) -> Path:
-    """Write a looping animation of the whole recording.
+    """Write a looping animation of the whole recording; gives the absolute path.
 
     A WebP has at most ``SIZE_LIMIT`` bytes, a GIF ``GIF_SIZE_LIMIT``. Needs no GPU, no display and
     no ffmpeg. About 60 ms of CPU per picture of 640 by 400.
@@ -50,9 +50,6 @@ def export_animation(
         fps: pictures per second of playback.
         size: width and height [px].
         progress: called with the finished share, 0..1.
-
-    Returns:
-        The absolute path.
 
     Raises:
         ConfigError: for a path that cannot be written, a recording that cannot be drawn, a speed,
@@ -88,12 +85,7 @@ def frame_times(recording: Recording, *, speed: float | int, fps: float | int) -
 
 
 def encoded_webp(frames: Sequence[Image.Image], milliseconds: int, limit: int) -> bytes:
-    """The pictures as one looping WebP, in the best quality that is small enough.
-
-    Args:
-        frames: two or more, of one size.
-        milliseconds: from one to the next.
-        limit: largest size [bytes].
+    """Two or more pictures as one looping WebP, in the best quality of at most ``limit`` bytes.
 
     Raises:
         ConfigError: if the file is too large in every quality.

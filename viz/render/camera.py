@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -44,10 +44,6 @@ class Camera:
     def focal_length(self) -> float:
         """Pixels per unit of slope."""
         return self.size[1] / 2 / np.tan(self.field_of_view / 2)
-
-    def scaled(self, factor: int) -> Camera:
-        """The same view on a picture ``factor`` times as large."""
-        return replace(self, size=(self.size[0] * factor, self.size[1] * factor))
 
     def project(self, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         """World points [m] to column, row [px] and nearness [1/m].

@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output
-from viz.palette import ACCENT, INK, MUTED, TRACK
-from viz.render.figure_style import PLOT_SUFFIXES, STYLE, save_figure
+from viz.style import ACCENT, INK, MUTED, PLOT_SUFFIXES, STYLE, TRACK, save_figure
 
 RateWithInterval = tuple[float, float, float]
 """A share of the runs, and the lower and upper end of its interval; 0 to 1."""
@@ -32,16 +31,13 @@ def export_distributions(
     *,
     title: str,
 ) -> Path:
-    """Write a figure of many runs.
+    """Write a figure of many runs; gives the absolute path.
 
     Args:
         numbers: the values of all runs by name; what is not finite is left out, and counted.
         rates: shares of the runs by name.
         path: file to write, ``.svg``, ``.png`` or ``.pdf``.
         title: what was run.
-
-    Returns:
-        The absolute path.
 
     Raises:
         ConfigError: for a path that cannot be written, or nothing to draw.

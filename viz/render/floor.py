@@ -26,12 +26,9 @@ _BLUR_LOW, _BLUR_HIGH = 0.010, 0.028  # [m] standard deviation of the blur for l
 def paint_floor(
     camera: Camera, casters: Surface, light: Float[np.ndarray, "3"]
 ) -> Float[np.ndarray, "h w 3"]:
-    """The picture without the robot: floor, background and shadow.
+    """The picture without the robot: floor, background, and the shadow of ``casters``.
 
-    Args:
-        camera: where the picture is taken from.
-        casters: what throws a shadow.
-        light: unit vector towards the light in the world.
+    ``light`` is the unit vector towards the light in the world.
     """
     horizon, x, y = _floor_points(camera)
     visible = _visibility(x, y, camera)
@@ -52,9 +49,7 @@ def paint_floor(
     return picture
 
 
-def _floor_points(
-    camera: Camera,
-) -> tuple[int, Float[np.ndarray, "r w"], Float[np.ndarray, "r w"]]:
+def _floor_points(camera: Camera) -> tuple[int, Float[np.ndarray, "r w"], Float[np.ndarray, "r w"]]:
     """First row that shows the floor, and the floor's x and y [m] in the pixels from there on.
 
     The camera has no roll, so distance along the view depends on the row alone.
@@ -127,6 +122,6 @@ def _blurred_mask(
     texels: Float[np.ndarray, "n 3"], triangles: Int[np.ndarray, "m 3"], blur: float
 ) -> Float[np.ndarray, "s s"]:
     covered = np.zeros((_TEXELS, _TEXELS), dtype=np.uint8)
-    covered.reshape(-1)[rasterize(texels, triangles, covered.shape).pixel] = 255
+    covered.reshape(-1)[rasterize(texels, triangles, covered.shape)[0]] = 255
     image = Image.fromarray(covered).filter(ImageFilter.GaussianBlur(blur))
     return np.asarray(image, dtype=np.float32) / 255

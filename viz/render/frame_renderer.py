@@ -8,23 +8,24 @@ from typing import final
 
 import numpy as np
 from jaxtyping import UInt8
+from PIL import Image, ImageDraw, ImageFont
 
+from go2_wbc.legs import LEGS
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import FOOT_RADIUS
 from viz.content import Annotation
-from viz.palette import FORCE, rgb
 from viz.render.camera import Camera
 from viz.render.framing import camera_path, heading_path, nearest_rows
-from viz.render.mesh import Surface
-from viz.render.overlay import Caption, draw_caption
-from viz.render.posed_robot import PosedRobot, arrow
+from viz.render.mesh import Surface, arrow
 from viz.render.renderer import render
-from viz.render.robot_meshes import load_robot_visuals
+from viz.render.robot_meshes import PosedRobot, load_robot_visuals
+from viz.style import ACCENT, ALARM, FORCE, INK, LEG_COLORS, MUTED, TRACK, rgb
 
 _INSTANT = 0.04  # [s] a limit that is broken for an instant is told for this long around it
 _SWAY_PERIOD = 26.0  # [s]
 _METRES_PER_NEWTON = 0.002  # length of the force arrows
 _LEAST_FORCE = 4.0  # [N] weaker forces draw no arrow
+_SUPERSAMPLING = 3  # Pillow draws shapes without antialiasing: draw larger, then shrink
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,18 +86,59 @@ class FrameRenderer:
     def shoot_captioned(
         self, time: float, *, speed: float | int = 1.0, with_progress: bool = True
     ) -> UInt8[np.ndarray, "h w 3"]:
-        """The picture at ``time`` with its caption."""
-        recording, k = self._recording, self._row(time)
+        """The picture at ``time`` with its caption along the lower edge.
+
+        The caption says what the robot does, or which limit it breaks, the time, the ``speed`` of
+        the playback if it is not 1, which feet touch the floor, and how much has passed.
+        """
+        image = Image.fromarray(self.shoot(time))
+        width, height = image.size
+        unit = height / 400
+        band = round(52 * unit)
+        strip = image.crop((0, height - band, width, height))
+        fine = (width * _SUPERSAMPLING, band * _SUPERSAMPLING)
+        strip = strip.resize(fine, Image.Resampling.BICUBIC)
+        self._draw_label(strip, time, speed, unit * _SUPERSAMPLING)
+        self._draw_feet(strip, time, unit * _SUPERSAMPLING)
+        if with_progress:
+            self._draw_progress(strip, time, unit * _SUPERSAMPLING)
+        image.paste(strip.resize((width, band), Image.Resampling.BOX), (0, height - band))
+        return np.asarray(image)
+
+    def _draw_label(self, strip: Image.Image, time: float, speed: float, unit: float) -> None:
+        """What the robot does, or what it breaks, in red; and the time."""
         broken = self._broken_at(time)
-        caption = Caption(
-            label=recording.labels[k] if broken is None else f"{broken.limit}: {broken.subject}",
-            time=time,
-            progress=time / max(recording.duration, 1e-9) if with_progress else None,
-            contacts=recording.foot_forces[k] > _LEAST_FORCE,
-            speed=speed,
-            is_alarm=broken is not None,
-        )
-        return draw_caption(self.shoot(time), caption)
+        label = self._recording.labels[self._row(time)]
+        if broken is not None:
+            label = f"{broken.limit}: {broken.subject}"
+        words = label.replace("_", " ").strip()
+        text = words[:1].upper() + words[1:]
+        clock = f"{time:.1f} s" + (f"   {speed:g}x" if speed != 1.0 else "")
+        draw, middle = ImageDraw.Draw(strip), strip.height - 28 * unit
+        font, small = ImageFont.load_default(15 * unit), ImageFont.load_default(11.5 * unit)
+        left, pad, half = 14 * unit, 11 * unit, 13 * unit
+        right = left + draw.textlength(text, font) + 2 * pad
+        back = INK if broken is None else ALARM
+        draw.rounded_rectangle((left, middle - half, right, middle + half), half, fill=back)
+        draw.text((left + pad, middle), text, "white", font, anchor="lm")
+        draw.text((right + 10 * unit, middle), clock, MUTED, small, anchor="lm")
+
+    def _draw_feet(self, strip: Image.Image, time: float, unit: float) -> None:
+        """A box for each foot, coloured while it touches the floor."""
+        draw, middle = ImageDraw.Draw(strip), strip.height - 28 * unit
+        font = ImageFont.load_default(11.5 * unit)
+        contacts = self._recording.foot_forces[self._row(time)] > _LEAST_FORCE
+        for leg, color, touches in zip(LEGS, LEG_COLORS, contacts, strict=True):
+            x = strip.width - (14 + 34 * (len(LEGS) - 1 - leg) + 14) * unit
+            box = (x - 14 * unit, middle - 10 * unit, x + 14 * unit, middle + 10 * unit)
+            draw.rounded_rectangle(box, 6 * unit, fill=color if touches else TRACK)
+            draw.text((x, middle), leg.name, "white" if touches else MUTED, font, anchor="mm")
+
+    def _draw_progress(self, strip: Image.Image, time: float, unit: float) -> None:
+        draw, top = ImageDraw.Draw(strip), strip.height - 4 * unit
+        share = time / max(self._recording.duration, 1e-9)
+        draw.rectangle((0, top, strip.width, strip.height), fill=TRACK)
+        draw.rectangle((0, top, strip.width * share, strip.height), fill=ACCENT)
 
     def _row(self, time: float) -> int:
         return int(nearest_rows(self._recording, np.array([time]))[0])

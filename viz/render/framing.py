@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 from scipy.ndimage import gaussian_filter1d
 
 from go2_wbc.recording import Recording
-from viz.render.posed_robot import PosedRobot
+from viz.render.robot_meshes import PosedRobot
 
 _STEP = 0.08  # [s] between the poses that are looked at; the camera is slower than that
 _TRUNK_ENDS = np.array([[0.33, 0.0, 0.08], [-0.25, 0.0, 0.08]])  # [m] nose and tail, base frame
@@ -29,10 +29,7 @@ def camera_path(
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, "k 3"]]:
     """Times [s] after the start, and the point to look at [m], calm and without delay.
 
-    Args:
-        recording: the run.
-        robot: gives the positions of the feet.
-        smoothing: standard deviation [s] of the low-pass filter.
+    ``robot`` says where the feet are; ``smoothing`` is the filter's standard deviation [s].
     """
     times = np.arange(0.0, recording.duration + _STEP, _STEP)
     middles = [_middle(recording.q[row], robot) for row in nearest_rows(recording, times)]
@@ -40,12 +37,7 @@ def camera_path(
 
 
 def heading_path(recording: Recording, *, smoothing: float) -> Float[np.ndarray, " n"]:
-    """Calm heading [rad] of the trunk at each sample, continuous over full turns.
-
-    Args:
-        recording: the run.
-        smoothing: standard deviation [s] of the low-pass filter.
-    """
+    """Calm heading [rad] of the trunk at each sample, continuous over full turns."""
     x, y, z, w = recording.q[:, 3:7].T
     yaw = np.unwrap(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
     return smoothed(recording.time, yaw[:, None], smoothing)[:, 0]
@@ -56,10 +48,7 @@ def smoothed(
 ) -> Float[np.ndarray, "n k"]:
     """Gaussian low-pass, without delay, of samples that may be uneven; the ends are held.
 
-    Args:
-        time: increasing [s].
-        values: one column per quantity.
-        deviation: standard deviation of the filter [s].
+    ``deviation`` is the filter's standard deviation, in the unit of the increasing ``time``.
     """
     step = deviation / _STEPS_PER_DEVIATION
     grid = np.arange(time[0] - deviation, time[-1] + deviation + step, step)

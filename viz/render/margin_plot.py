@@ -15,8 +15,18 @@ from matplotlib.figure import Figure
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output
 from viz.content import MarginCurve, Verdict
-from viz.palette import ACCENT, ALARM, BROKEN_FILL, GOOD, INK, MUTED, TIGHT
-from viz.render.figure_style import PLOT_SUFFIXES, STYLE, save_figure
+from viz.style import (
+    ACCENT,
+    ALARM,
+    BROKEN_FILL,
+    GOOD,
+    INK,
+    MUTED,
+    PLOT_SUFFIXES,
+    STYLE,
+    TIGHT,
+    save_figure,
+)
 
 _COLUMNS = 3
 _PANEL = (3.6, 1.75)  # [inch] width and height of one curve with its words
@@ -26,15 +36,12 @@ _ABOVE, _BELOW = "#f6f8fc", "#fdeeee"
 
 
 def export_plot(verdict: Verdict, path: Path, *, title: str) -> Path:
-    """Write the margins of every limit over time, the broken ones first.
+    """Write the margins of every limit over time, the broken ones first; gives the absolute path.
 
     Args:
         verdict: what a check says.
         path: file to write, ``.svg``, ``.png`` or ``.pdf``.
         title: name of the motion.
-
-    Returns:
-        The absolute path.
 
     Raises:
         ConfigError: for a path that cannot be written, or a verdict without a curve.

@@ -1,4 +1,4 @@
-"""Triangle surfaces: smooth normals with creases, and simplification."""
+"""Triangle surfaces: smooth normals with creases, simplification, and arrows."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ import trimesh
 from jaxtyping import Float, Int
 
 _WELD_DIGITS = 5  # [10 um] vertices that round to the same are one; the exporter repeats them
+_ARROW_SIDES, _ARROW_CREASE = 12, np.deg2rad(40.0)  # the 30 deg between its sides look round
+_HEAD_WIDTH, _HEAD_LENGTH = 2.4, 4.5  # radius and length of an arrow's head over its shaft's radius
 _QUADRIC_REGULARISATION = 0.02  # share of the mean point in a cluster's position; keeps it inside
 
 
@@ -137,3 +139,15 @@ def _cluster_points(
     damping = _QUADRIC_REGULARISATION * np.maximum(trace, 1e-12)
     quadric += damping[:, None, None] * np.eye(3)
     return mean + np.linalg.solve(quadric, target[:, :, None])[:, :, 0]
+
+
+def arrow(
+    start: Float[np.ndarray, "3"], length: float, radius: float, color: tuple[float, float, float]
+) -> Surface:
+    """An upright arrow of this length [m] from ``start``; ``radius`` [m] is that of its shaft."""
+    neck, wide = length - min(_HEAD_LENGTH * radius, 0.6 * length), _HEAD_WIDTH * radius
+    profile = [(0.0, 0.0), (radius, 0.0), (radius, neck), (wide, neck), (0.0, length)]
+    solid = trimesh.creation.revolve(profile, sections=_ARROW_SIDES)
+    return smooth_surface(
+        solid.vertices + start, solid.faces, np.array(color), crease=_ARROW_CREASE
+    )

@@ -7,8 +7,6 @@ pixels and not of a Python loop. The nearest triangle wins (z-buffer: Catmull 19
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -16,25 +14,12 @@ _LEAST_AREA = 1e-9  # [px^2] flatter triangles have no inside
 _COVERAGE_SLACK = 1e-6  # [px] samples this close to an edge count, so that no crack opens
 
 
-@dataclass(frozen=True, slots=True)
-class Fragments:
-    """The visible samples of a picture.
-
-    Attributes:
-        pixel: (k,) flat index, row * width + column, each at most once.
-        triangle: (k,) row of the triangle that is in front there.
-    """
-
-    pixel: Int[np.ndarray, " k"]
-    triangle: Int[np.ndarray, " k"]
-
-
 def rasterize(
-    points: Float[np.ndarray, "n 3"],
-    triangles: Int[np.ndarray, "m 3"],
-    size: tuple[int, int],
-) -> Fragments:
-    """Find the triangle that is in front at each sample.
+    points: Float[np.ndarray, "n 3"], triangles: Int[np.ndarray, "m 3"], size: tuple[int, int]
+) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
+    """The samples that are covered, and the row of the triangle that is in front at each.
+
+    A sample is known by its flat index, row * width + column.
 
     A sample lies at the centre of its pixel. Of two triangles the one with the larger third
     coordinate is in front; give 1 / distance, which is linear in the picture where distance is
@@ -81,19 +66,12 @@ def _doubled_area(
 
 
 def plane_coefficients(
-    x: Float[np.ndarray, "3 m"],
-    y: Float[np.ndarray, "3 m"],
-    value: Float[np.ndarray, "3 m"],
+    x: Float[np.ndarray, "3 m"], y: Float[np.ndarray, "3 m"], value: Float[np.ndarray, "3 m"]
 ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
     """Slopes along x and y, and value at the origin, of the plane through three corner values.
 
     From value[k] - value[0] = slope_x (x[k] - x[0]) + slope_y (y[k] - y[0]) for k = 1, 2 by
-    Cramer's rule, whose determinant is twice the area.
-
-    Args:
-        x: columns of the three corners [px].
-        y: rows of the three corners [px].
-        value: the quantity at the corners.
+    Cramer's rule, whose determinant is twice the area; ``x`` and ``y`` are columns and rows [px].
     """
     area = _doubled_area(x, y)
     d1, d2 = value[1] - value[0], value[2] - value[0]
@@ -141,7 +119,7 @@ def _resolve(
     nearness: Float[np.ndarray, " k"],
     triangle: Int[np.ndarray, " k"],
     samples: int,
-) -> Fragments:
+) -> tuple[Int[np.ndarray, " v"], Int[np.ndarray, " v"]]:
     """Keep the nearest candidate of each sample; among equals the last triangle."""
     nearest = np.zeros(samples, dtype=np.float32)
     np.maximum.at(nearest, pixel, nearness)
@@ -149,4 +127,4 @@ def _resolve(
     winner = np.full(samples, -1, dtype=np.int32)
     winner[pixel[front]] = triangle[front]
     seen = np.flatnonzero(winner >= 0)
-    return Fragments(seen, winner[seen])
+    return seen, winner[seen]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
@@ -42,7 +43,8 @@ def render(
     lights = towards_lights(turn)
     picture = paint_floor(camera, robot, lights[0])
     solids = Surface.joined([robot, *extras])
-    projected = camera.scaled(samples).project(solids.points)
+    finer = replace(camera, size=(samples * width, samples * height))
+    projected = finer.project(solids.points)
     projected[len(robot.points) :, 2] *= _EXTRAS_LEAD
     brightness = _vertex_brightness(solids.normals, camera.R_camera_world[2], lights)
     color, coverage = _solids(solids, projected, brightness, camera.size, samples)
@@ -66,10 +68,10 @@ def _solids(
 ) -> tuple[Float[np.ndarray, "k 3"], Float[np.ndarray, " k"]]:
     """Colour (times coverage) and coverage of each pixel by solid geometry."""
     width, height = size
-    seen = rasterize(projected, solids.triangles, (width * samples, height * samples))
-    is_seen = np.bincount(seen.triangle, minlength=len(solids.triangles)) > 0
-    faces, slot = np.flatnonzero(is_seen), (np.cumsum(is_seen) - 1)[seen.triangle]
-    row, column = np.divmod(seen.pixel, width * samples)
+    sample, triangle = rasterize(projected, solids.triangles, (width * samples, height * samples))
+    is_seen = np.bincount(triangle, minlength=len(solids.triangles)) > 0
+    faces, slot = np.flatnonzero(is_seen), (np.cumsum(is_seen) - 1)[triangle]
+    row, column = np.divmod(sample, width * samples)
     corners = solids.triangles[faces].T
     diffuse, highlight = _interpolated(projected, corners, brightness, (row, column, slot))
     pixel = (row // samples) * width + column // samples
@@ -91,11 +93,7 @@ def _interpolated(
 ) -> list[Float[np.ndarray, " k"]]:
     """Vertex values at samples, linear over each triangle and never beyond its corners.
 
-    Args:
-        projected: the vertices in the picture.
-        corners: vertices of each visible triangle.
-        values: the quantities, a column each.
-        samples: row, column and triangle of each sample.
+    ``samples`` are row and column of each, and its column of ``corners``, the visible triangles.
     """
     row, column, slot = samples
     x, y = projected[:, 0][corners], projected[:, 1][corners]

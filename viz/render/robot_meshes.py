@@ -1,14 +1,17 @@
-"""The Go2's visual meshes, colours and placements, each mesh loaded once and shared by the legs."""
+"""The Go2's visual meshes, each loaded once and shared by the legs, and the robot in a pose."""
 
 from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import final
 
 import numpy as np
 import pinocchio as pin
+from jaxtyping import Float
 
+from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.robot.description import find_description, read_mesh
 from viz.render.mesh import Surface, simplify, smooth_surface
 
@@ -63,3 +66,33 @@ def _surfaces(path: str) -> tuple[Surface, ...]:
         )
         for part in read_mesh(Path(path))
     )
+
+
+@final
+class PosedRobot:
+    """Places the robot's surface in the world."""
+
+    def __init__(self, visuals: RobotVisuals) -> None:
+        """Gather the surfaces of each link in the frame of its joint."""
+        self._model = visuals.model
+        self._data = visuals.model.createData()
+        self._foot_frames = [visuals.model.getFrameId(name) for name in FOOT_NAMES]
+        self._links = [
+            (item.parentJoint, Surface.joined(visuals.meshes[item.meshPath]).placed(item.placement))
+            for item in visuals.geometry.geometryObjects
+        ]
+
+    def at(self, q: Float[np.ndarray, "19"]) -> Surface:
+        """The robot's surface in the configuration ``q`` (quaternion x y z w)."""
+        pin.forwardKinematics(self._model, self._data, q)
+        return Surface.joined([link.placed(self._data.oMi[joint]) for joint, link in self._links])
+
+    def feet(self, q: Float[np.ndarray, "19"]) -> Float[np.ndarray, "4 3"]:
+        """Centres of the four feet in the world [m]."""
+        pin.framesForwardKinematics(self._model, self._data, q)
+        return np.array([self._data.oMf[frame].translation for frame in self._foot_frames])
+
+    def on_trunk(self, points: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
+        """Points of the base frame in the world [m], in the configuration placed last."""
+        T_world_base = self._data.oMi[1]
+        return points @ T_world_base.rotation.T + T_world_base.translation

@@ -17,8 +17,7 @@ from go2_wbc.robot.model import FOOT_RADIUS
 from viz.content import check_recording
 from viz.render.frame_renderer import FrameRenderer, ShotStyle
 from viz.render.framing import nearest_rows
-from viz.render.posed_robot import PosedRobot
-from viz.render.robot_meshes import load_robot_visuals
+from viz.render.robot_meshes import PosedRobot, load_robot_visuals
 
 FILMSTRIP_SUFFIXES = (".png",)
 _MOST_PANELS = 6
@@ -35,16 +34,13 @@ _CANDIDATES = 60  # poses of a span that are looked at
 def export_filmstrip(
     recording: Recording, path: Path, *, times: Sequence[float | int] | None = None
 ) -> Path:
-    """Write moments of a recording side by side as one PNG with a transparent background.
+    """Write moments of a recording side by side as one transparent PNG; gives the absolute path.
 
     Args:
         recording: what happened.
         path: file to write, ``.png``.
         times: seconds after the start, one per panel; by default one telling moment of each
             behaviour.
-
-    Returns:
-        The absolute path.
 
     Raises:
         ConfigError: for a path that cannot be written, a recording that cannot be drawn, or times

@@ -18,32 +18,17 @@ from viz.replay.page_data import content_text, scene_text
 HTML_SUFFIXES = (".html", ".htm")
 PAGE_LIMIT = 4_000_000
 """Largest page [bytes]."""
-_SCRIPTS = (
-    "replay_data.js",
-    "replay_stage.js",
-    "replay_scene.js",
-    "replay_ghost.js",
-    "replay_steps.js",
-    "replay_flags.js",
-    "replay_charts.js",
-    "replay_trust.js",
-    "replay_verdict.js",
-    "replay_sound.js",
-    "replay_app.js",
-)
-_LIVE_SCRIPT = "replay_live.js"
+_SCRIPTS = "data stage scene ghost steps flags charts trust verdict sound app"
+"""Of the assets, in the order in which they need one another; a live page has another one."""
 
 
 def export_html(shown: Recording | ReplayContent, path: Path, *, title: str) -> Path:
-    """Write an interactive 3D replay as one self-contained page.
+    """Write an interactive 3D replay as one self-contained page; gives its absolute path.
 
     Args:
         shown: what happened, or a plan, with what there is to say about it.
         path: file to write, ``.html``.
         title: heading and window title; any text.
-
-    Returns:
-        The absolute path.
 
     Raises:
         ConfigError: for a path that cannot be written, a recording that cannot be drawn, or one
@@ -61,20 +46,13 @@ def export_html(shown: Recording | ReplayContent, path: Path, *, title: str) -> 
 
 
 def page_text(title: str, scene: str, data: str, *, is_live: bool = False) -> str:
-    """The page.
-
-    Args:
-        title: any text.
-        scene: the packed scene.
-        data: what happens in it, packed.
-        is_live: the page listens to the server that it came from.
-    """
-    scripts = (*_SCRIPTS, _LIVE_SCRIPT) if is_live else _SCRIPTS
+    """The page of a packed scene and what happens in it; a live one listens to its server."""
+    scripts = f"{_SCRIPTS} live" if is_live else _SCRIPTS
     bundle = Path(meshcat.viewer_assets_path()) / "dist" / "main.min.js"
     parts = {
         "TITLE": html.escape(title),
         "STYLE": _asset("replay.css"),
-        "SCRIPT": "\n".join(_asset(name) for name in scripts),
+        "SCRIPT": "\n".join(_asset(f"replay_{name}.js") for name in scripts.split()),
         "MESHCAT": compressed_text(bundle.read_bytes()),
         "SCENE": scene,
         "DATA": data,

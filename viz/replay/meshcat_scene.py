@@ -19,10 +19,10 @@ import pinocchio as pin
 from meshcat.transformations import rotation_matrix, translation_matrix
 
 from go2_wbc.legs import LEGS
-from viz.palette import FORCE, INK, LEG_COLORS
 from viz.render.mesh import Surface
 from viz.render.robot_meshes import RobotVisuals
 from viz.replay.packing import Pack
+from viz.style import FORCE, INK, LEG_COLORS
 
 _NORMAL_LEVELS = 127  # of a signed 8-bit number
 _SHAFT_RADIUS, _HEAD_RADIUS, _HEAD_LENGTH = 0.007, 0.018, 0.035  # [m] force arrow
@@ -47,11 +47,7 @@ class SharedMesh(shapes.Geometry):
 
 
 def robot_scene(visuals: RobotVisuals, pack: Pack) -> dict[str, object]:
-    """The commands that build the scene, and how the page moves it.
-
-    Args:
-        visuals: the robot.
-        pack: receives the vertices.
+    """The commands that build the scene, and how the page moves it; ``pack`` gets the vertices.
 
     Returns:
         Header entries: ``meshes`` (count), ``commands``, ``base`` (path of the moving trunk) and
@@ -76,12 +72,7 @@ def robot_scene(visuals: RobotVisuals, pack: Pack) -> dict[str, object]:
             node.set_object(SharedMesh(table[item.meshPath, row]), _material(part))
             node.set_transform(item.placement.homogeneous)
     _add_markers(scene)
-    return {
-        "meshes": len(table),
-        "commands": _plain(commands),
-        "base": paths[1],
-        "joints": joints,
-    }
+    return {"meshes": len(table), "commands": _plain(commands), "base": paths[1], "joints": joints}
 
 
 def _plain(commands: list[object]) -> object:

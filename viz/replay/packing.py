@@ -13,13 +13,6 @@ from jaxtyping import Shaped
 
 _ALIGNMENT = 8  # [bytes] typed arrays in a browser must start at a multiple of their item size
 _QUANTISED_LEVELS = 65535  # of an unsigned 16-bit number
-_NAMES = {
-    np.dtype(np.float32): "Float32Array",
-    np.dtype(np.uint32): "Uint32Array",
-    np.dtype(np.uint16): "Uint16Array",
-    np.dtype(np.int8): "Int8Array",
-    np.dtype(np.uint8): "Uint8Array",
-}
 
 
 @final
@@ -40,7 +33,8 @@ class Pack:
     ) -> None:
         """Store an array of one of the types that a browser knows; ``extra`` is told with it."""
         blob = np.ascontiguousarray(array).tobytes()
-        entry = {"type": _NAMES[array.dtype], "shape": array.shape, "offset": self._size}
+        kind = f"{array.dtype.name.capitalize()}Array"  # float32 is a browser's Float32Array
+        entry = {"type": kind, "shape": array.shape, "offset": self._size}
         self._entries[name] = {**entry, **(extra or {})}
         blob += b"\0" * (-len(blob) % _ALIGNMENT)
         self._blobs.append(blob)

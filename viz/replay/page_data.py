@@ -1,23 +1,32 @@
-"""What a page holds besides its code: the scene, once, and what happens in it."""
+"""What a page holds besides its code: the scene, once, and what happens in it, at even steps."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from collections.abc import Mapping
+from dataclasses import asdict, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from go2_wbc.legs import LEGS
+from go2_wbc.recording import Recording
+from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import FOOT_RADIUS
-from viz.content import ReplayContent, Verdict
-from viz.palette import LEG_COLORS
-from viz.render.posed_robot import PosedRobot
-from viz.render.robot_meshes import load_robot_visuals
+from viz.content import MarginCurve, ReplayContent, Verdict
+from viz.render.framing import smoothed
+from viz.render.robot_meshes import PosedRobot, load_robot_visuals
 from viz.replay.meshcat_scene import robot_scene
 from viz.replay.packing import Pack
-from viz.replay.replay_data import ReplayFrames, reduced, replay_frames
+from viz.style import LEG_COLORS
 
 _FORCE_PERCENTILE = 99.5  # a touchdown spike beyond it may be cut off in the contact strip
 _LEAST_FORCE_SCALE = 50.0  # [N] a full row of the contact strip is at least this much
+_FRAME_RATE = 50.0  # [Hz] finer is not seen at 60 Hz screens, swings stay smooth
+_MOST_FRAMES = 6000  # keeps the page of a long recording small; the rate drops instead
+_MOST_MARGINS = 3000  # samples of a margin curve; the least of each step is kept
+_CAMERA_SMOOTHING = 0.7  # [s]
+_PLAIN = {"stance": np.uint8, "margin": np.float32, "torque": np.float32}
+"""How frames are stored that are not 16-bit numbers between their extremes."""
 
 
 def scene_text() -> str:
@@ -30,14 +39,14 @@ def scene_text() -> str:
 
 def content_text(content: ReplayContent, title: str, version: str = "") -> str:
     """What happens, packed; ``version`` tells one text of a live page from the next."""
-    robot, pack = PosedRobot(load_robot_visuals()), Pack()
-    frames = replay_frames(content.recording, robot)
-    highest = float(np.percentile(frames.foot_forces, _FORCE_PERCENTILE))
+    pack = Pack()
+    rate, frames = replay_frames(content.recording)
+    highest = float(np.percentile(frames["forces"], _FORCE_PERCENTILE))
     header: dict[str, object] = {
         "title": title,
         "version": version,
         "is_plan": content.is_plan,
-        **_add_frames(pack, "", frames),
+        **_add_frames(pack, "", rate, frames),
         "labels": [[s.start, s.end, s.label] for s in content.recording.spans()],
         "force_scale": max(highest, _LEAST_FORCE_SCALE),
         "beats": list(content.beats),
@@ -54,20 +63,58 @@ def content_text(content: ReplayContent, title: str, version: str = "") -> str:
         header["verdict"] = _add_verdict(pack, content.verdict)
     for name, other in (("ghost", content.ghost), ("written", content.written)):
         if other is not None:
-            header[name] = _add_frames(pack, f"{name}.", replay_frames(other, robot))
+            header[name] = _add_frames(pack, f"{name}.", *replay_frames(other))
     return pack.packed(header)
 
 
-def _add_frames(pack: Pack, prefix: str, frames: ReplayFrames) -> dict[str, object]:
-    pack.add_quantised(f"{prefix}q", frames.q)
-    pack.add_quantised(f"{prefix}feet", frames.p_world_feet)
-    pack.add_quantised(f"{prefix}com", frames.p_world_com)
-    pack.add_quantised(f"{prefix}target", frames.p_world_camera_target)
-    pack.add_quantised(f"{prefix}forces", frames.foot_forces)
-    pack.add(f"{prefix}stance", frames.stance.astype(np.uint8))
-    pack.add(f"{prefix}margin", frames.support_margin.astype(np.float32))
-    pack.add(f"{prefix}torque", frames.torque_ratio.astype(np.float32))
-    return {"rate": frames.rate, "frames": len(frames.q)}
+def replay_frames(recording: Recording) -> tuple[float, dict[str, np.ndarray]]:
+    """A recording of any, also uneven, rate at even steps: frames per second, and rows by name.
+
+    ``q`` has neighbouring quaternions in the same half-space, ``feet`` are the centres FL FR RL RR
+    and ``com`` the centre of mass [m], ``target`` is the smoothed ground position of the base [m],
+    ``stance`` the planned contacts. Of ``forces`` [N] and ``torque`` (the greatest of |torque| /
+    limit of any joint) it is the largest in the step, of the support's ``margin`` [m] the least, so
+    that a short peak is not lost; nan where that is undefined.
+    """
+    rate = min(_FRAME_RATE, (_MOST_FRAMES - 1) / recording.duration)
+    count = max(2, int(np.floor(recording.duration * rate)) + 1)
+    rate = (count - 1) / recording.duration
+    wanted = recording.time[0] + np.arange(count) / rate
+    last = len(recording.time) - 1
+    rows = np.minimum(np.searchsorted(recording.time, wanted - 0.25 / rate), last)
+    rows[-1] = last
+    robot, q = PosedRobot(load_robot_visuals()), _continuous(recording.q[rows])
+    ratio = np.max(np.abs(recording.tau) / find_description().efforts, axis=1)
+    return rate, {
+        "q": q,
+        "feet": np.array([robot.feet(row).ravel() for row in q]),
+        "com": recording.p_world_com[rows],
+        "target": smoothed(recording.time, recording.q[:, :2], _CAMERA_SMOOTHING)[rows],
+        "forces": np.maximum.reduceat(recording.foot_forces, rows),
+        "stance": recording.stance[rows],
+        "margin": np.fmin.reduceat(recording.support_margin, rows),
+        "torque": np.maximum.reduceat(ratio, rows),
+    }
+
+
+def _continuous(q: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 19"]:
+    """Flip quaternions so that neighbours never differ by the sign alone."""
+    flips = np.sum(q[1:, 3:7] * q[:-1, 3:7], axis=1) < 0
+    signs = np.concatenate([[1.0], np.cumprod(np.where(flips, -1.0, 1.0))])
+    result = q.copy()
+    result[:, 3:7] *= signs[:, None]
+    return result
+
+
+def _add_frames(
+    pack: Pack, prefix: str, rate: float, frames: Mapping[str, np.ndarray]
+) -> dict[str, object]:
+    for name, values in frames.items():
+        if name in _PLAIN:
+            pack.add(f"{prefix}{name}", values.astype(_PLAIN[name]))
+        else:
+            pack.add_quantised(f"{prefix}{name}", values)
+    return {"rate": rate, "frames": len(frames["q"])}
 
 
 def _add_verdict(pack: Pack, verdict: Verdict) -> dict[str, object]:
@@ -78,14 +125,23 @@ def _add_verdict(pack: Pack, verdict: Verdict) -> dict[str, object]:
         pack.add(f"curve{k}.worst", curve.worst.astype(np.uint8))
         words = {"name": curve.name, "unit": curve.unit, "subjects": curve.subjects}
         curves.append({**words, "tight": float(curve.tight)})
-    annotations = [asdict(annotation) for annotation in verdict.annotations]
-    certified = verdict.certified
     return {
         "ok": verdict.ok,
         "text": verdict.text,
-        "annotations": annotations,
+        "annotations": [asdict(annotation) for annotation in verdict.annotations],
         "curves": curves,
         "chance": verdict.chance,
         "world": verdict.world,
-        "certified": None if certified is None else asdict(certified),
+        "certified": None if verdict.certified is None else asdict(verdict.certified),
     }
+
+
+def reduced(curve: MarginCurve) -> MarginCurve:
+    """The curve with at most ``_MOST_MARGINS`` samples: the least of each step."""
+    step = -(-len(curve.time) // _MOST_MARGINS)
+    if step <= 1:
+        return curve
+    known = np.where(np.isnan(curve.margin), np.inf, curve.margin)
+    edges = range(0, len(known), step)
+    rows = np.array([start + int(known[start : start + step].argmin()) for start in edges])
+    return replace(curve, time=curve.time[rows], margin=curve.margin[rows], worst=curve.worst[rows])

@@ -12,7 +12,6 @@ import logging
 import threading
 import uuid
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import final
@@ -41,19 +40,6 @@ _HEADERS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class _State:
-    """What pages show now: packed data with its version, and what is wrong with the newest."""
-
-    data: str
-    version: str
-    error: str | None = None
-
-    def text(self) -> str:
-        """What a page is told of it, as JSON."""
-        return json.dumps({"version": self.version, "error": self.error})
-
-
 @final
 class PreviewServer(ThreadingHTTPServer):
     """A context manager that serves a page until its end.
@@ -62,6 +48,7 @@ class PreviewServer(ThreadingHTTPServer):
 
     Attributes:
         url: address of the page.
+        data: what the page shows now, packed.
         on_values: who is told what was chosen.
     """
 
@@ -93,7 +80,7 @@ class PreviewServer(ThreadingHTTPServer):
         self._scene = scene_text()
         self._changed = threading.Condition()
         self._is_open = True
-        self._state = self._packed(content)
+        self._pack(content)
         try:
             super().__init__((LOOPBACK, port), _Handler)
         except OverflowError as error:
@@ -113,11 +100,15 @@ class PreviewServer(ThreadingHTTPServer):
         Raises:
             ConfigError: for a recording that cannot be drawn.
         """
-        self._set(self._packed(content))
+        with self._changed:
+            self._pack(content)
+            self._changed.notify_all()
 
     def publish_error(self, message: str) -> None:
         """Say what is wrong, and keep what was shown."""
-        self._set(replace(self._state, error=message))
+        with self._changed:
+            self._error = message
+            self._changed.notify_all()
 
     def close(self) -> None:
         """End; open pages say so."""
@@ -134,11 +125,7 @@ class PreviewServer(ThreadingHTTPServer):
 
     def page(self) -> str:
         """The page with what it shows now."""
-        return page_text(self._title, self._scene, self._state.data, is_live=True)
-
-    def data(self) -> str:
-        """What the page shows now, packed."""
-        return self._state.data
+        return page_text(self._title, self._scene, self.data, is_live=True)
 
     def next_state(self, seen: str | None) -> str | None:
         """Wait for another state than ``seen``; "" if there is none for long.
@@ -147,26 +134,23 @@ class PreviewServer(ThreadingHTTPServer):
             Version and error as JSON; ``None`` once the server ends.
         """
         with self._changed:
-            self._changed.wait_for(
-                lambda: not self._is_open or self._state.text() != seen, _HEARTBEAT
-            )
+            self._changed.wait_for(lambda: not self._is_open or self._told() != seen, _HEARTBEAT)
             if not self._is_open:
                 return None
-            state = self._state.text()
+            state = self._told()
         return "" if state == seen else state
+
+    def _told(self) -> str:
+        return json.dumps({"version": self._version, "error": self._error})
 
     def handle_error(self, request: object, client_address: object) -> None:
         """Log what went wrong in an answer; the page may have been closed meanwhile."""
         _log.info("no answer to %s", client_address, exc_info=True)
 
-    def _packed(self, content: ReplayContent) -> _State:
+    def _pack(self, content: ReplayContent) -> None:
         version = uuid.uuid4().hex
-        return _State(content_text(checked_content(content), self._title, version), version)
-
-    def _set(self, state: _State) -> None:
-        with self._changed:
-            self._state = state
-            self._changed.notify_all()
+        self.data = content_text(checked_content(content), self._title, version)
+        self._version, self._error = version, None
 
 
 @final
@@ -177,33 +161,36 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Answer one request."""
-        hosts = {f"{name}:{self.server.server_port}" for name in LOOPBACK_NAMES}
-        if self.headers.get("Host", "") not in hosts:
-            self._answer("only for this machine\n", "text/plain", HTTPStatus.FORBIDDEN)
+        if not self._is_own(self.headers.get("Host", "")):
+            self._refuse("only for this machine", HTTPStatus.FORBIDDEN)
         elif self.path == "/":
             self._answer(self.server.page(), "text/html")
         elif self.path == "/data":
-            self._answer(self.server.data(), "text/plain")
+            self._answer(self.server.data, "text/plain")
         elif self.path == "/events":
             self._stream()
         else:
-            self._answer("not here\n", "text/plain", HTTPStatus.NOT_FOUND)
+            self._refuse("not here", HTTPStatus.NOT_FOUND)
 
     def do_POST(self) -> None:
         """Take values for the parameters, from a page of this server only."""
-        port, on_values = self.server.server_port, self.server.on_values
-        own = {f"{name}:{port}" for name in LOOPBACK_NAMES}
-        origin = self.headers.get("Origin", "")
-        if self.headers.get("Host", "") not in own or origin.removeprefix("http://") not in own:
-            self._answer("only for this machine\n", "text/plain", HTTPStatus.FORBIDDEN)
+        on_values = self.server.on_values
+        origin = self.headers.get("Origin", "").removeprefix("http://")
+        if not (self._is_own(self.headers.get("Host", "")) and self._is_own(origin)):
+            self._refuse("only for this machine", HTTPStatus.FORBIDDEN)
         elif self.path != "/parameters" or on_values is None:
-            self._answer("not here\n", "text/plain", HTTPStatus.NOT_FOUND)
+            self._refuse("not here", HTTPStatus.NOT_FOUND)
         elif (values := self._values()) is None:
-            why = "needs names with numbers or words, as JSON\n"
-            self._answer(why, "text/plain", HTTPStatus.BAD_REQUEST)
+            self._refuse("needs names with numbers or words, as JSON", HTTPStatus.BAD_REQUEST)
         else:
             on_values(values)
             self._answer("", "text/plain")
+
+    def _is_own(self, host: str) -> bool:
+        return host in {f"{name}:{self.server.server_port}" for name in LOOPBACK_NAMES}
+
+    def _refuse(self, why: str, status: HTTPStatus) -> None:
+        self._answer(f"{why}\n", "text/plain", status)
 
     def _values(self) -> Values | None:
         """What was sent, if it is values."""

@@ -1,7 +1,8 @@
 """ROS 2: the robot as a node (``serve``), and a client with ``GO2Controller``'s methods.
 
-Nothing of ROS is imported until one of these names is asked for; without the extra ``[ros2]`` that
-raises ``MissingDependency``, which names the line that installs it.
+Here are the names of what the server offers. Nothing of ROS is imported until ``serve`` or
+``GO2ControllerNode`` is asked for; without the extra ``[ros2]`` that raises ``MissingDependency``,
+which names the line that installs it.
 """
 
 from __future__ import annotations
@@ -17,3 +18,17 @@ if TYPE_CHECKING:
 __all__ = ["GO2ControllerNode", "serve"]
 
 __getattr__ = lazy_exports(__name__)
+
+BEHAVIOR_SERVICE, STATISTICS_SERVICE = "robot_behavior_command", "statistics"
+MOTION_ACTION = "play_motion"
+CMD_VEL, ODOM = "cmd_vel", "odom"
+SERVER_NODE = "go2_wbc"
+COMMAND_PERIOD = 0.02
+"""Time [s] between two sendings of a velocity command that lasts."""
+COMMAND_QUEUE = 100
+"""Commands that are kept for the loop: two seconds' worth, should the machine be that busy."""
+
+
+def topic(namespace: str, name: str) -> str:
+    """Full name of a topic, service or action of one robot."""
+    return f"/{namespace}/{name}"

@@ -10,15 +10,17 @@ import logging
 import threading
 from typing import Any
 
+from controller.bridges.ros2 import MOTION_ACTION
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.behaviors import Jobs, motion_job
-from controller.bridges.ros2.names import FEEDBACK_RATE, MOTION_ACTION, MOTION_NODE
 from controller.jobs import Answer, Job
 
 _log = logging.getLogger(__name__)
 
 THREADS = 3
 """One waits for the motion, the others serve cancels and further goals."""
+FEEDBACK_PERIOD = 0.1
+"""Time [s] between two messages of how far a motion has come."""
 
 
 class MotionActions:
@@ -28,7 +30,7 @@ class MotionActions:
         """Offer the action of the robot ``namespace`` in ``context``."""
         self._jobs = jobs
         self._node = ros.Node(
-            MOTION_NODE, namespace=namespace, context=context, start_parameter_services=False
+            "go2_wbc_motions", namespace=namespace, context=context, start_parameter_services=False
         )
         self._server = ros.ActionServer(
             self._node,
@@ -62,7 +64,7 @@ class MotionActions:
         goal, answered = handle.request, concurrent.futures.Future[Answer]()
         go2, reply = self._jobs.robot, answered.set_result
         self._jobs.submit(motion_job(goal.motion, goal.settings, go2, reply))
-        while not concurrent.futures.wait([answered], 1.0 / FEEDBACK_RATE).done:
+        while not concurrent.futures.wait([answered], FEEDBACK_PERIOD).done:
             if handle.is_cancel_requested:  # again and again: one that came early gets lost
                 self._jobs.cancel()
             if (job := self._jobs.job) is not None:

@@ -8,16 +8,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from controller import arguments
+from controller.bridges import ros2
 from controller.bridges.ros2 import imports as ros
-from controller.bridges.ros2.names import (
-    BEHAVIOR_SERVICE,
-    CMD_VEL,
-    COMMAND_PERIOD,
-    COMMAND_QUEUE,
-    MOTION_ACTION,
-    ODOM,
-    topic,
-)
 from controller.bridges.ros2.states import state_of
 from controller.modes import listed
 from controller.navigation import DriveStraight, Goal, TurnInPlace
@@ -74,19 +66,15 @@ class GO2ControllerNode(ros.Node):
             raise BridgeError("call rclpy.init() before making a GO2ControllerNode")
         super().__init__(node_name)
         self.last_message, self.progress = "", 0.0
-        self._behavior_client = self.create_client(
-            ros.RobotBehaviorCommand, topic(namespace, BEHAVIOR_SERVICE)
+        behavior, cmd_vel, motion, odom = (
+            ros2.topic(namespace, name)
+            for name in (ros2.BEHAVIOR_SERVICE, ros2.CMD_VEL, ros2.MOTION_ACTION, ros2.ODOM)
         )
-        self._cmd_vel_pub = self.create_publisher(
-            ros.Twist, topic(namespace, CMD_VEL), COMMAND_QUEUE
-        )
-        self._motion_client = (
-            ros.ActionClient(self, ros.PlayMotion, topic(namespace, MOTION_ACTION))
-            if ros.PlayMotion is not None
-            else None
-        )
+        self._behavior_client = self.create_client(ros.RobotBehaviorCommand, behavior)
+        self._cmd_vel_pub = self.create_publisher(ros.Twist, cmd_vel, ros2.COMMAND_QUEUE)
+        self._motion_client = ros.PlayMotion and ros.ActionClient(self, ros.PlayMotion, motion)
         self._odometry = ros.Future()
-        self.create_subscription(ros.Odometry, topic(namespace, ODOM), self._take_odometry, 1)
+        self.create_subscription(ros.Odometry, odom, self._take_odometry, 1)
         self._velocity: Any = None
         self._velocity_lock, self._is_closed = threading.Lock(), threading.Event()
         self._repeater = threading.Thread(target=self._repeat, name="go2-repeat", daemon=True)
@@ -148,7 +136,7 @@ class GO2ControllerNode(ros.Node):
         self._cmd_vel_pub.publish(_twist(VelocityCommand()))
 
     def _repeat(self) -> None:
-        while not self._is_closed.wait(COMMAND_PERIOD):
+        while not self._is_closed.wait(ros2.COMMAND_PERIOD):
             with self._velocity_lock:
                 if self._velocity is not None:
                     self._cmd_vel_pub.publish(self._velocity)

@@ -14,7 +14,7 @@ import sys
 import time
 from typing import Any, final
 
-from controller.bridges.ros2.names import SERVER_NODE
+from controller.bridges.ros2 import SERVER_NODE
 from go2_wbc.errors import BridgeError
 
 _log = logging.getLogger(__name__)

@@ -3,6 +3,10 @@
 Everything but the action runs in one thread: after every control period the loop asks for calls
 and commands, publishes what is due, and sleeps if it is to keep the pace of the wall clock. What
 goes wrong in here is logged and counted; it never stops the control of the robot.
+
+An executor takes 0.1 ms a turn to find that there is nothing to do, and half a millisecond for a
+callback; asking a handle takes 2 us. The handles are not documented: that is why the extra pins
+the version of rclpy.
 """
 
 from __future__ import annotations
@@ -16,23 +20,17 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from itertools import cycle
 from pathlib import Path
 from typing import Any
 
 from controller import arguments
+from controller.bridges import ros2
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.actions import MotionActions
 from controller.bridges.ros2.behaviors import COMMANDS, order
-from controller.bridges.ros2.names import (
-    BEHAVIOR_SERVICE,
-    BODY_POSE,
-    CMD_VEL,
-    SERVER_NODE,
-    STATISTICS_SERVICE,
-)
 from controller.bridges.ros2.namespace_lock import GraphWatch, lock_namespace
-from controller.bridges.ros2.polling import PolledService, PolledSubscription
 from controller.bridges.ros2.states import StatePublisher
 from controller.bridges.ros2.velocity import VelocityInput
 from controller.go2_controller import GO2Controller
@@ -49,6 +47,8 @@ LATE = 0.25
 """Lag [s] behind the wall clock after which the pace is given up and taken up anew."""
 LINGER = 0.2
 """Time [s] in which the last answers reach their callers before the node goes."""
+Poll = Callable[[], None]
+"""Takes what has come since the last call, at most one queue full, and acts on it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,14 +123,7 @@ def serve(
                 after_tick=lambda: node.serve(stop),
             )
         )
-        node = RobotNode(
-            context,
-            go2,
-            simulator,
-            config,
-            realtime=settings.realtime,
-            sensors=settings.sensors,
-        )
+        node = RobotNode(context, go2, simulator, config, settings)
         stack.callback(node.close)
         on_ready(node.offer)
         node.run(stop, watch)
@@ -146,42 +139,38 @@ class RobotNode:
         go2: GO2Controller,
         simulator: MujocoPlant,
         config: Config,
-        *,
-        realtime: bool,
-        sensors: str,
+        settings: ServerSettings,
     ) -> None:
         """Offer ``go2``, which drives ``simulator``, in ``context``."""
         self._go2, namespace = go2, go2.namespace
         self._node = node = ros.Node(
-            SERVER_NODE, namespace=namespace, context=context, start_parameter_services=False
+            ros2.SERVER_NODE, namespace=namespace, context=context, start_parameter_services=False
         )
         self._jobs = JobServer(go2)
         self._velocity = VelocityInput(go2, config.cautious_envelope, config.pose)
-        self._poses = PolledSubscription(node, ros.Pose, BODY_POSE, self._take_pose)
-        self._twists = PolledSubscription(node, ros.Twist, CMD_VEL, self._take_twist)
-        self._commands = (
-            PolledService(node, ros.RobotBehaviorCommand, BEHAVIOR_SERVICE, self._take_command)
-            if ros.RobotBehaviorCommand is not None
-            else None
-        )
+        self._poll_twists = polled_topic(node, ros.Twist, ros2.CMD_VEL, self._take_twist)
+        self._poll_poses = polled_topic(node, ros.Pose, "body_pose", self._take_pose)
+        self._poll_commands: Poll = lambda: None
+        if (kind := ros.RobotBehaviorCommand) is not None:
+            self._poll_commands = polled_service(
+                node,
+                kind,
+                ros2.BEHAVIOR_SERVICE,
+                lambda request, reply: self._order(request.command, reply),
+            )
         self._triggers = cycle(self._offer_triggers())
-        self._states = StatePublisher(node, simulator, realtime=realtime, sensors=sensors)
-        self._actions = (
-            MotionActions(context, namespace, self._jobs) if ros.PlayMotion is not None else None
+        self._states = StatePublisher(
+            node, simulator, realtime=settings.realtime, sensors=settings.sensors
         )
-        self._pacer = Pacer(simulator.control_period, LATE) if realtime else None
+        self._actions = ros.PlayMotion and MotionActions(context, namespace, self._jobs)
+        self._pacer = Pacer(simulator.control_period, LATE) if settings.realtime else None
         self._throttle, self._errors = LogThrottle(_log), 0
         self._cpu, self._began = 0.0, time.monotonic()
 
-    def _offer_triggers(self) -> Iterator[PolledService]:
-        for name in COMMANDS:
-            yield PolledService(
-                self._node,
-                ros.Trigger,
-                name,
-                lambda _request, reply, name=name: self._order(name, reply),
-            )
-        yield PolledService(self._node, ros.Trigger, STATISTICS_SERVICE, self._tell_statistics)
+    def _offer_triggers(self) -> Iterator[Poll]:
+        acts = {name: partial(self._take_trigger, name) for name in COMMANDS}
+        for name, act in {**acts, ros2.STATISTICS_SERVICE: self._tell_statistics}.items():
+            yield polled_service(self._node, ros.Trigger, name, act)
 
     @property
     def offer(self) -> str:
@@ -214,16 +203,12 @@ class RobotNode:
             self._pacer.wait(lambda: self._guarded(self._poll_commands))
 
     def _serve_once(self) -> None:
-        next(self._triggers).poll()
+        next(self._triggers)()
         self._poll_commands()
-        self._twists.poll()
-        self._poses.poll()
+        self._poll_twists()
+        self._poll_poses()
         self._velocity.expire()
         self._states.publish_due()
-
-    def _poll_commands(self) -> None:
-        if self._commands is not None:
-            self._commands.poll()
 
     def _guarded(self, act: Callable[[], object]) -> None:
         began = time.thread_time()
@@ -244,8 +229,8 @@ class RobotNode:
         at = pose.orientation
         self._velocity.accept_pose(pose.position.z, (at.x, at.y, at.z, at.w))
 
-    def _take_command(self, request: Any, reply: Reply) -> None:
-        self._order(request.command, reply)
+    def _take_trigger(self, name: str, _request: Any, reply: Reply) -> None:
+        self._order(name, reply)
 
     def _order(self, command: str, reply: Reply) -> None:
         order(self._jobs, command, reply)
@@ -278,3 +263,40 @@ class RobotNode:
             self._actions.close()
         time.sleep(LINGER)
         self._node.destroy_node()
+
+
+def polled_topic(node: Any, kind: Any, name: str, act: Callable[[Any], None]) -> Poll:
+    """Subscribe ``node`` to a topic; ``act`` is given each message when it is polled."""
+    handle = node.create_subscription(kind, name, _never, ros2.COMMAND_QUEUE).handle
+
+    def poll() -> None:
+        for _ in range(ros2.COMMAND_QUEUE):
+            with handle:
+                taken = handle.take_message(kind, False)
+            if taken is None:
+                return
+            act(taken[0])
+
+    return poll
+
+
+def polled_service(node: Any, kind: Any, name: str, act: Callable[[Any, Reply], None]) -> Poll:
+    """Offer a service that answers ``success`` and ``message``; ``act`` is given each request."""
+    service = node.create_service(kind, name, _never)
+
+    def answer(header: Any, answer: Answer) -> None:
+        service.send_response(kind.Response(success=answer.ok, message=answer.reason), header)
+
+    def poll() -> None:
+        for _ in range(ros2.COMMAND_QUEUE):
+            with service.handle:
+                request, header = service.handle.service_take_request(kind.Request)
+            if request is None:
+                return
+            act(request, partial(answer, header))
+
+    return poll
+
+
+def _never(*_arguments: Any) -> None:
+    """The callback that ROS wants; no executor ever calls it."""

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from controller.bridges.ros2 import ODOM
 from controller.bridges.ros2 import imports as ros
-from controller.bridges.ros2.names import ODOM, QUEUE, STATE_RATE, TRANSFORM_RATE
 from go2_wbc.legs import JOINT_NAMES, Leg
 from go2_wbc.plant.mujoco.plant import MujocoPlant
 from go2_wbc.plant.sensors import SensorErrors, SensorNoise
@@ -21,6 +21,10 @@ from go2_wbc.robot.state import RobotState
 
 _log = logging.getLogger(__name__)
 
+QUEUE = 10
+"""Messages that are kept for a slow reader."""
+STATE_RATE, TRANSFORM_RATE = 100.0, 50.0
+"""Messages per second of robot time: of what is measured, and of /tf."""
 FEET_ORDER = (Leg.FR, Leg.FL, Leg.RR, Leg.RL)
 """The order of the feet in ``RobotFootContact``."""
 _NOISE, _ERRORS, _FILTER = SensorNoise(), SensorErrors(), EstimatorConfig()

@@ -7,21 +7,18 @@ import math
 
 import numpy as np
 
-from controller.bridges.ros2.names import CMD_VEL_SILENCE
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
 from controller.pacing import LogThrottle
 from go2_wbc.errors import CommandError
-from go2_wbc.planning.command import (
-    ZERO_COMMAND,
-    VelocityCommand,
-    VelocityEnvelope,
-    finite_number,
-)
+from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope, finite_number
 from go2_wbc.planning.pose import LEVEL, BodyPose, PoseEnvelope
 from go2_wbc.robot.rotations import rpy_from_quaternion
 
 _log = logging.getLogger(__name__)
+
+CMD_VEL_SILENCE = 0.5
+"""Robot time [s] without a command after which the robot stops."""
 
 
 class VelocityInput:
@@ -32,10 +29,7 @@ class VelocityInput:
     """
 
     def __init__(
-        self,
-        go2: GO2Controller,
-        envelope: VelocityEnvelope,
-        poses: PoseEnvelope | None = None,
+        self, go2: GO2Controller, envelope: VelocityEnvelope, poses: PoseEnvelope | None = None
     ) -> None:
         """Drive ``go2`` within the envelopes of velocities and of poses."""
         self._go2, self._envelope, self._poses = go2, envelope, poses or PoseEnvelope()
@@ -47,13 +41,9 @@ class VelocityInput:
         )
 
     def accept(self, x: float, y: float, turn: float, *, is_busy: bool) -> None:
-        """Follow the velocity x, y [m/s], turn [rad/s], if that is possible now.
+        """Follow the velocity x forward, y to the left [m/s], turn left [rad/s], if it can now.
 
-        Args:
-            x: forward.
-            y: to the left.
-            turn: to the left.
-            is_busy: whether the robot carries out a behaviour, which is not to be disturbed.
+        Not while it ``is_busy`` with a behaviour, which is not to be disturbed.
         """
         self.counts["received"] += 1
         if not all(map(math.isfinite, (x, y, turn))):
@@ -77,9 +67,7 @@ class VelocityInput:
     def accept_pose(self, height: float, quaternion: tuple[float, float, float, float]) -> None:
         """Take a pose of the trunk while the robot walks; it lasts until the next one.
 
-        Args:
-            height: from the usual one [m].
-            quaternion: of the trunk from that of one that walks level, x y z w; all 0 is level.
+        ``height`` [m] is from the usual one, ``quaternion`` (x y z w) from level; all 0 is level.
         """
         try:
             rpy = _attitude(quaternion)

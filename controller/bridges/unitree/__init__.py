@@ -1,4 +1,20 @@
 """Unitree's own protocol (DDS): their ``SportClient`` moves our robot, our controller their robot.
 
-Only ``bus.py`` and ``idl.py`` import the DDS library, and they are imported by what needs them.
+Only ``bus.py`` imports the DDS library, and it is imported by what needs it.
 """
+
+from __future__ import annotations
+
+import importlib
+
+from go2_wbc.errors import MissingDependency
+
+
+def require_dds() -> None:
+    """Raise MissingDependency, with the install line, unless the DDS library is there and works."""
+    try:
+        importlib.import_module("cyclonedds.core")
+    except ImportError as error:
+        raise MissingDependency(
+            f'Unitree\'s protocol needs CycloneDDS ({error}): python -m pip install -e ".[unitree]"'
+        ) from error

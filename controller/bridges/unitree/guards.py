@@ -9,16 +9,16 @@ from typing import Final, final
 import numpy as np
 
 from controller.behaviours.joints import DAMPING
-from controller.bridges.unitree import layout
+from controller.bridges.unitree import messages
 from go2_wbc.errors import CommandError
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand, RobotState
 from go2_wbc.validation import POSITIVE, ranged
 
 _BOUNDS: Final = (
-    ("kp", 0.0, layout.KP_MAX),
-    ("kd", 0.0, layout.KD_MAX),
-    ("v_des", -layout.SPEED_MAX, layout.SPEED_MAX),
+    ("kp", 0.0, messages.KP_MAX),
+    ("kd", 0.0, messages.KD_MAX),
+    ("v_des", -messages.SPEED_MAX, messages.SPEED_MAX),
 )
 
 

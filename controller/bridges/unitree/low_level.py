@@ -17,9 +17,8 @@ import numpy as np
 from jaxtyping import Float, Shaped
 
 from controller.behaviours.joints import DAMPING
-from controller.bridges.unitree import layout
-from controller.bridges.unitree.codec import decode_message
-from controller.bridges.unitree.layout import FEET_SWAPPED, JOINTS_SWAPPED, MOTORS
+from controller.bridges.unitree import messages
+from controller.bridges.unitree.messages import FEET_SWAPPED, JOINTS_SWAPPED, MOTORS, decode_message
 from controller.pacing import LogThrottle
 from go2_wbc.errors import CommandError
 from go2_wbc.plant.sensors import ImuSample
@@ -41,7 +40,7 @@ REPORT_PERIOD: Final = 1.0
 def intact_message(kind: np.dtype[np.void], data: bytes) -> Shaped[np.ndarray, "1"]:
     """A low-level message of the wire's bytes; CommandError if it is none, or damaged."""
     message = decode_message(kind, data)
-    if not layout.is_intact(message):
+    if not messages.is_intact(message):
         raise CommandError("wrong checksum")
     return message
 
@@ -55,21 +54,21 @@ def joint_command(
         CommandError: if a value is not finite or out of limits.
     """
     motors = message["motor_cmd"][0, :MOTORS][JOINTS_SWAPPED]
-    obeys = motors["mode"] == layout.SERVO
+    obeys = motors["mode"] == messages.SERVO
     q, dq, tau, kp, kd = (motors[name].astype(float) for name in ("q", "dq", "tau", "kp", "kd"))
     for name in ("q", "dq", "tau", "kp", "kd"):
         if not np.isfinite(motors[name]).all():
             raise CommandError(f"{name} is not finite")
-    kp = np.where(obeys & (np.abs(q) < 0.5 * layout.POSITION_STOP), kp, 0.0)
+    kp = np.where(obeys & (np.abs(q) < 0.5 * messages.POSITION_STOP), kp, 0.0)
     kd, tau = np.where(obeys, kd, 0.0), np.where(obeys, tau, 0.0)
-    dq = np.where(np.abs(dq) >= layout.VELOCITY_STOP, 0.0, dq)
+    dq = np.where(np.abs(dq) >= messages.VELOCITY_STOP, 0.0, dq)
     q = np.where(kp > 0.0, q, 0.0)
     held = kp > 0.0
     for name, values, least, greatest in (
-        ("kp", kp, 0.0, layout.KP_MAX),
-        ("kd", kd, 0.0, layout.KD_MAX),
-        ("tau", tau, -layout.TAU_MAX, layout.TAU_MAX),
-        ("dq", dq, -layout.SPEED_MAX, layout.SPEED_MAX),
+        ("kp", kp, 0.0, messages.KP_MAX),
+        ("kd", kd, 0.0, messages.KD_MAX),
+        ("tau", tau, -messages.TAU_MAX, messages.TAU_MAX),
+        ("dq", dq, -messages.SPEED_MAX, messages.SPEED_MAX),
         ("q", q[held], lower[held] - ANGLE_MARGIN, upper[held] + ANGLE_MARGIN),
     ):
         outside = (values < least) | (values > greatest)
@@ -80,17 +79,17 @@ def joint_command(
 
 def low_state_message(state: RobotState, imu: ImuSample) -> Shaped[np.ndarray, "1"]:
     """``rt/lowstate`` of a state and what the IMU reads; battery, temperatures, remote are zero."""
-    message = layout.new_message(layout.LOW_STATE)
-    message["head"], message["level_flag"] = layout.HEAD, layout.LOW_LEVEL
+    message = np.zeros(1, messages.LOW_STATE)
+    message["head"], message["level_flag"] = messages.HEAD, messages.LOW_LEVEL
     fill_imu(message["imu_state"], imu, state)
     motors = message["motor_state"][0, :MOTORS]
-    motors["mode"] = layout.SERVO
+    motors["mode"] = messages.SERVO
     motors["q"] = state.joint_positions[JOINTS_SWAPPED]
     motors["dq"] = state.joint_velocities[JOINTS_SWAPPED]
     motors["tau_est"] = state.tau[JOINTS_SWAPPED]
     message["foot_force"] = np.rint(state.foot_forces[FEET_SWAPPED])
     message["tick"] = round(1000 * state.time)
-    layout.seal(message)
+    messages.seal(message)
     return message
 
 
@@ -103,14 +102,14 @@ def fill_imu(target: Shaped[np.ndarray, "1"], imu: ImuSample, state: RobotState)
 
 def low_cmd_message(command: JointCommand) -> Shaped[np.ndarray, "1"]:
     """``rt/lowcmd`` that asks for ``command``; motors that do not exist stay switched off."""
-    message = layout.new_message(layout.LOW_CMD)
-    message["head"], message["level_flag"] = layout.HEAD, layout.LOW_LEVEL
+    message = np.zeros(1, messages.LOW_CMD)
+    message["head"], message["level_flag"] = messages.HEAD, messages.LOW_LEVEL
     motors = message["motor_cmd"][0, :MOTORS]
-    motors["mode"] = layout.SERVO
+    motors["mode"] = messages.SERVO
     motors["q"], motors["dq"] = command.q_des[JOINTS_SWAPPED], command.v_des[JOINTS_SWAPPED]
     motors["kp"], motors["kd"] = command.kp[JOINTS_SWAPPED], command.kd[JOINTS_SWAPPED]
     motors["tau"] = command.tau[JOINTS_SWAPPED]
-    layout.seal(message)
+    messages.seal(message)
     return message
 
 
@@ -172,7 +171,7 @@ class CommandGate:
         newest = None
         for data in samples:
             try:
-                message = intact_message(layout.LOW_CMD, data)
+                message = intact_message(messages.LOW_CMD, data)
                 newest = joint_command(message, self._lower, self._upper)
                 self.accepted += 1
             except CommandError as error:

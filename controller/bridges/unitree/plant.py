@@ -15,16 +15,15 @@ from typing import TYPE_CHECKING, Final, final
 import numpy as np
 
 from controller.behaviours.joints import DAMPING
-from controller.bridges.unitree.codec import encode_message
-from controller.bridges.unitree.extra import require_dds
+from controller.bridges.unitree import require_dds
 from controller.bridges.unitree.guards import GuardConfig, Guards, is_passive, require_sane
-from controller.bridges.unitree.layout import LOW_STATE
 from controller.bridges.unitree.low_level import (
     intact_message,
     low_cmd_message,
     sensor_reading,
     with_own_attitude,
 )
+from controller.bridges.unitree.messages import LOW_STATE, encode_message
 from controller.bridges.unitree.sport_api import SWITCHER_SERVICE, Code, SwitcherApi
 from controller.errands import BackgroundLog
 from controller.pacing import SWITCH_INTERVAL

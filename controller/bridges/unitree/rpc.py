@@ -12,13 +12,7 @@ from functools import partial
 from typing import Final, final
 
 from controller.bridges.unitree.bus import Bus
-from controller.bridges.unitree.codec import (
-    Reply,
-    Request,
-    Response,
-    decode_call,
-    encode_call,
-)
+from controller.bridges.unitree.messages import Reply, Request, Response, decode_call, encode_call
 from controller.bridges.unitree.sport_api import API_VERSION, LEASE_TERM, Api, Code
 from go2_wbc.errors import CommandError
 

@@ -17,10 +17,16 @@ from typing import Final, final
 import numpy as np
 
 from controller.bridges.unitree import sport_api
-from controller.bridges.unitree.codec import Reply, Request
+from controller.bridges.unitree.messages import Reply, Request
 from controller.bridges.unitree.sport_api import Api, Code, SportMode, SportStatus
-from controller.bridges.unitree.sport_path import SportPath
-from controller.bridges.unitree.sport_robot import MOTIONS, POSE, STANDING_UP, WALKS, SportRobot
+from controller.bridges.unitree.sport_robot import (
+    MOTIONS,
+    POSE,
+    STANDING_UP,
+    WALKS,
+    SportPath,
+    SportRobot,
+)
 from controller.jobs import Answer, Job, JobServer
 from controller.modes import Aborted, Measurements, Mode
 from go2_wbc.errors import Go2WbcError

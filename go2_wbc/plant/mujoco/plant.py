@@ -17,6 +17,7 @@ from jaxtyping import Float
 from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, unknown_name
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant
+from go2_wbc.plant.faults import Faults, InjectedFault
 from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN, bin_forces, read_joints
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
@@ -28,7 +29,7 @@ from go2_wbc.plant.terrain import Terrain
 from go2_wbc.records import packed
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel, drive
-from go2_wbc.robot.state import JointCommand, OdometryCovariance, RobotState
+from go2_wbc.robot.state import JointCommand, OdometryCovariance, PartFault, RobotState
 from go2_wbc.world import SENSORS
 
 _logger = logging.getLogger(__name__)
@@ -146,6 +147,7 @@ class MujocoPlant(Plant):
         self._ticks = 0
         self._late, self._acting = round(delay / control_period), np.zeros((5, 12))
         self._waiting: deque[Float[np.ndarray, "5 12"]] = deque()  # commands that do not act yet
+        self._faults = Faults()
         self._pushes = Pushes(self._model, self._data, self._layout)
         # Views into MuJoCo's memory, made once because making them is slow.
         data, layout = self._data, self._layout
@@ -156,6 +158,8 @@ class MujocoPlant(Plant):
         settle(self._model, data, layout, setup, start_rng)
         # One period in the lying state, so that the first read has forces and torques.
         self._senses: Proprioception | None = None
+        self._state: RobotState | None = None
+        self._imu: ImuSample | None = None
         self.write(JointCommand.damping(LYING_DAMPING))
         self._ticks, self._data.time = 0, 0.0
         if sensors == "imu":
@@ -207,6 +211,8 @@ class MujocoPlant(Plant):
         if self._state is None:
             state, noise = self.truth(), self._noise
             self._state = state if noise is None else noise.corrupt_state(state, self._rng)
+            if self._faults.known:
+                self._state = self._faults.seen(self._state, self.imu(), FOOT_CONTACT_THRESHOLD)
         return self._state
 
     @property
@@ -238,15 +244,17 @@ class MujocoPlant(Plant):
         if len(self._waiting) > self._late:
             self._acting = self._waiting.popleft()
         model, data = self._model, self._data
-        total = np.zeros(12)
+        total, shares = np.zeros(12), self._faults.torque_shares(self.time)
         for remaining in range(self._substeps, 0, -1):
             drive(self._acting, *self._motors, total)
+            if shares is not None:
+                data.ctrl[self._layout.motors] *= shares
             self._pushes.apply()
             mujoco.mj_step2(model, data)
             if remaining == 1:
                 self._forces = self._ground_forces()
             mujoco.mj_step1(model, data)
-        self._tau = total / self._substeps
+        self._tau = total / self._substeps if shares is None else total * shares / self._substeps
         self._ticks += 1
         self._check_physics()
         self._sense()
@@ -273,6 +281,34 @@ class MujocoPlant(Plant):
         """
         self._check_open()
         self._pushes.add(force, duration, at)
+
+    def fault(
+        self, kind: str, part: str = "", at: float | None = None, value: float | None = None
+    ) -> None:
+        """Breaks a part of the robot, for tests and experiments.
+
+        Args:
+            kind: one of ``go2_wbc.plant.faults.FaultKind``: ``"motor"``, ``"encoder"``,
+                ``"encoder_stuck"``, ``"foot_force"``, ``"gyro"``, ``"accelerometer"``,
+                ``"not_a_number"``, ``"lost_packets"``.
+            part: a joint (``"FL_calf_joint"``), a foot (``"FL_foot"``) or an axis (``"x"``).
+            at: plant time [s]; now, unless said.
+            value: what the part gives, or errs by; see ``FaultKind``.
+
+        Raises:
+            CommandError: for a kind or a part that does not exist, or a number that is none.
+        """
+        self._check_open()
+        fault = InjectedFault.of(kind, part, self.time if at is None else at, value)
+        if self._senses is None and not self._faults.known:  # how it reads while it is sound
+            self._faults.seen(self.read(), self.imu(), FOOT_CONTACT_THRESHOLD)
+        self._faults.known += (fault,)
+
+    @property
+    def sensor_faults(self) -> tuple[PartFault, ...]:
+        """See ``Plant.sensor_faults``; who is told the true state looks once a part is broken."""
+        watch = self._senses or self._faults.watch
+        return () if watch is None else watch.faults
 
     def place(self, q: Float[np.ndarray, "19"], v: Float[np.ndarray, "18"] | None = None) -> None:
         """Moves the robot to a state at once, for tests and experiments; time stands still.
@@ -376,9 +412,16 @@ class MujocoPlant(Plant):
 
     def _sense(self) -> None:
         """Lets the robot's own sensors read, if it lives on them."""
+        last = self._state, self._imu
         self._truth, self._state, self._imu = None, None, None
-        if self._senses is not None:
-            self._state, self._imu = self._senses.sense(self.truth(), self._true_imu())
+        if last[0] is not None and self._faults.loses(self.time, self._rng):
+            self._state, self._imu = last
+        elif self._senses is not None:
+            sample = self.truth(), self._true_imu()
+            if self._faults.known:
+                self._state, self._imu = self._senses.sense(*sample, self._faults.broken)
+            else:
+                self._state, self._imu = self._senses.sense(*sample)
 
     def _true_imu(self) -> ImuSample:
         sensor = self._data.sensor

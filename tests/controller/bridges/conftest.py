@@ -35,13 +35,14 @@ def server(graph: None) -> Iterator[Process]:
 
 
 @pytest.fixture
-def probe(graph: None) -> Iterator[WatchingProbe]:
+def probe(server: Process) -> Iterator[WatchingProbe]:
+    """Watches the robot of ``server``."""
     with closing(WatchingProbe()) as node:
         yield node
 
 
 @pytest.fixture
-def paced(server: Process, probe: WatchingProbe) -> Callable[[Callable[[], Done]], Done]:
+def paced(probe: WatchingProbe) -> Callable[[Callable[[], Done]], Done]:
     """Runs a program whose limits count on real time, again if the server has lost it."""
 
     def run(act: Callable[[], Done]) -> Done:

@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.bridges.processes import wait_until
 from benchmarks.bridges.ros2_processes import DISCOVERY, Probe
-from controller.bridges.ros2.names import ODOM, topic
+from controller.bridges.ros2 import ODOM, topic
 from go2_wbc.errors import BridgeError
 from go2_wbc.robot.state import RobotState
 

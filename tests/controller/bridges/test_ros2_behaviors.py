@@ -7,15 +7,14 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 
 from controller.bridges.ros2.behaviors import COMMANDS, Jobs, motion_job, order
-from controller.bridges.ros2.names import CMD_VEL_SILENCE
-from controller.bridges.ros2.velocity import VelocityInput
+from controller.bridges.ros2.velocity import CMD_VEL_SILENCE, VelocityInput
 from controller.go2_controller import GO2Controller
 from controller.jobs import Answer, JobServer
 from controller.modes import Mode
@@ -36,6 +35,12 @@ from tests.controller.fake_go2 import FakeGo2
 from tests.controller.plants import PERIOD, WatchedPlant
 
 HANG_GUARD = 30.0
+
+
+@pytest.fixture
+def go2() -> Iterator[GO2Controller]:
+    with GO2Controller(plant=WatchedPlant()) as go2:
+        yield go2
 
 
 def jobs_of(go2: GO2Controller) -> Jobs:
@@ -131,11 +136,10 @@ def played(go2: GO2Controller, motion: str, *settings: str) -> Answer:
     return answers[0]
 
 
-def test_a_motion_is_prepared_beside_the_loop_and_played_from_lying() -> None:
-    with GO2Controller(plant=WatchedPlant()) as go2:
-        answer = played(go2, "nod", "times=1")
-        assert answer.ok, answer.reason
-        assert go2.mode is Mode.STANDING
+def test_a_motion_is_prepared_beside_the_loop_and_played_from_lying(go2: GO2Controller) -> None:
+    answer = played(go2, "nod", "times=1")
+    assert answer.ok, answer.reason
+    assert go2.mode is Mode.STANDING
 
 
 def test_a_motion_is_prepared_for_the_robot_that_is_driven(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -154,7 +158,9 @@ def test_a_motion_is_prepared_for_the_robot_that_is_driven(monkeypatch: pytest.M
     assert [np.isinf(model.motor.no_load_speed).all() for model in models] == [True, True]
 
 
-def test_a_high_five_is_compiled_and_checked_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_high_five_is_compiled_and_checked_once(
+    monkeypatch: pytest.MonkeyPatch, go2: GO2Controller
+) -> None:
     # It was compiled for the check, and again by the robot's own high five, in the loop's thread.
     done: list[str] = []
 
@@ -170,17 +176,15 @@ def test_a_high_five_is_compiled_and_checked_once(monkeypatch: pytest.MonkeyPatc
             monkeypatch.setattr(module, "compile_timeline", counted("compiled", compile_timeline))
     report = counted("checked", FeasibilityReport.of)
     monkeypatch.setattr(FeasibilityReport, "of", staticmethod(report))
-    with GO2Controller(plant=WatchedPlant()) as go2:
-        answer = played(go2, "high_five", "hold=0.5", "side=left")
+    answer = played(go2, "high_five", "hold=0.5", "side=left")
     assert answer.ok, answer.reason
     assert "mean paw height" in answer.reason
     assert done == ["compiled in prepare", "checked in prepare"]
 
 
-def test_a_high_five_at_another_height_is_measured_as_well() -> None:
+def test_a_high_five_at_another_height_is_measured_as_well(go2: GO2Controller) -> None:
     # It was played as any motion, and nobody looked at the paw: its name alone was known.
-    with GO2Controller(plant=WatchedPlant()) as go2:
-        answer = played(go2, "high_five", "hold=0.5", "height=0.62")
+    answer = played(go2, "high_five", "hold=0.5", "height=0.62")
     assert answer.ok, answer.reason
     assert "planned paw height [m] 0.62," in answer.reason
 
@@ -213,36 +217,37 @@ def test_settings_are_read_as_numbers_or_words() -> None:
 # --- velocities ---------------------------------------------------------------------------------
 
 
-def test_a_velocity_lasts_half_a_second() -> None:
-    with GO2Controller(plant=WatchedPlant()) as go2:
-        velocity = VelocityInput(go2, VelocityEnvelope())
-        assert go2.walk()
-        velocity.accept(0.3, 0.1, 0.2, is_busy=False)
-        assert go2.command == VelocityCommand(0.3, 0.1, 0.2)
-        go2.wait(CMD_VEL_SILENCE - 2 * PERIOD)
-        velocity.expire()
-        assert not go2.command.is_zero
-        go2.wait(3 * PERIOD)
-        velocity.expire()
-        assert go2.command.is_zero
-        assert velocity.counts["silences"] == 1
+@pytest.fixture
+def velocity(go2: GO2Controller) -> VelocityInput:
+    return VelocityInput(go2, VelocityEnvelope())
+
+
+def test_a_velocity_lasts_half_a_second(go2: GO2Controller, velocity: VelocityInput) -> None:
+    assert go2.walk()
+    velocity.accept(0.3, 0.1, 0.2, is_busy=False)
+    assert go2.command == VelocityCommand(0.3, 0.1, 0.2)
+    go2.wait(CMD_VEL_SILENCE - 2 * PERIOD)
+    velocity.expire()
+    assert not go2.command.is_zero
+    go2.wait(3 * PERIOD)
+    velocity.expire()
+    assert go2.command.is_zero
+    assert velocity.counts["silences"] == 1
 
 
 def test_velocities_that_cannot_be_followed_are_counted_and_warned_of_once(
-    caplog: pytest.LogCaptureFixture,
+    caplog: pytest.LogCaptureFixture, go2: GO2Controller, velocity: VelocityInput
 ) -> None:
-    with GO2Controller(plant=WatchedPlant()) as go2:
-        velocity = VelocityInput(go2, VelocityEnvelope())
-        velocity._throttle = LogThrottle(logging.getLogger("cmd_vel"), math.inf)
-        for _ in range(5):
-            velocity.accept(0.3, 0.0, 0.0, is_busy=False)
-            velocity.accept(math.nan, 0.0, 0.0, is_busy=False)
-        assert go2.walk()
-        velocity.accept(0.3, 0.0, math.inf, is_busy=False)
-        velocity.accept(0.3, 0.0, 0.0, is_busy=True)
-        assert go2.command.is_zero
-        velocity.accept(9.0, 0.0, 0.0, is_busy=False)
-        assert go2.command.linear_x == pytest.approx(VelocityEnvelope().forward)
+    velocity._throttle = LogThrottle(logging.getLogger("cmd_vel"), math.inf)
+    for _ in range(5):
+        velocity.accept(0.3, 0.0, 0.0, is_busy=False)
+        velocity.accept(math.nan, 0.0, 0.0, is_busy=False)
+    assert go2.walk()
+    velocity.accept(0.3, 0.0, math.inf, is_busy=False)
+    velocity.accept(0.3, 0.0, 0.0, is_busy=True)
+    assert go2.command.is_zero
+    velocity.accept(9.0, 0.0, 0.0, is_busy=False)
+    assert go2.command.linear_x == pytest.approx(VelocityEnvelope().forward)
     counts = velocity.counts
     assert (counts["received"], counts["followed"]) == (13, 1)
     assert (counts["not_finite"], counts["out_of_mode"]) == (6, 6)
@@ -253,19 +258,17 @@ def test_velocities_that_cannot_be_followed_are_counted_and_warned_of_once(
 LEVEL_QUATERNION = (0.0, 0.0, 0.0, 1.0)
 
 
-def test_a_pose_lasts_beyond_the_velocities() -> None:
-    with GO2Controller(plant=WatchedPlant()) as go2:
-        velocity = VelocityInput(go2, VelocityEnvelope())
-        velocity.accept_pose(-0.03, tuple(quaternion_from_rpy(0.1, -0.05, 0.15).tolist()))
-        assert go2.walk()
-        velocity.accept(0.3, 0.0, 0.0, is_busy=False)
-        pose = go2.body_pose
-        assert pose.row == pytest.approx([-0.03, 0.1, -0.05, 0.15])
-        velocity.end()
-        assert go2.command.is_zero
-        assert go2.body_pose == pose
-        velocity.accept_pose(0.0, LEVEL_QUATERNION)
-        assert go2.body_pose == LEVEL
+def test_a_pose_lasts_beyond_the_velocities(go2: GO2Controller, velocity: VelocityInput) -> None:
+    velocity.accept_pose(-0.03, tuple(quaternion_from_rpy(0.1, -0.05, 0.15).tolist()))
+    assert go2.walk()
+    velocity.accept(0.3, 0.0, 0.0, is_busy=False)
+    pose = go2.body_pose
+    assert pose.row == pytest.approx([-0.03, 0.1, -0.05, 0.15])
+    velocity.end()
+    assert go2.command.is_zero
+    assert go2.body_pose == pose
+    velocity.accept_pose(0.0, LEVEL_QUATERNION)
+    assert go2.body_pose == LEVEL
 
 
 @pytest.mark.parametrize(
@@ -278,12 +281,13 @@ def test_a_pose_lasts_beyond_the_velocities() -> None:
     ],
 )
 def test_a_pose_that_cannot_be_taken_is_counted_and_changes_nothing(
-    height: float, quaternion: tuple[float, float, float, float]
+    height: float,
+    quaternion: tuple[float, float, float, float],
+    go2: GO2Controller,
+    velocity: VelocityInput,
 ) -> None:
-    with GO2Controller(plant=WatchedPlant()) as go2:
-        velocity = VelocityInput(go2, VelocityEnvelope())
-        assert go2.walk()
-        velocity.accept_pose(0.01, (0.0, 0.0, 0.0, 0.0))  # nobody has set the orientation
-        velocity.accept_pose(height, quaternion)
-        assert go2.body_pose == BodyPose(0.01)
-        assert velocity.counts["poses_refused"] == 1
+    assert go2.walk()
+    velocity.accept_pose(0.01, (0.0, 0.0, 0.0, 0.0))  # nobody has set the orientation
+    velocity.accept_pose(height, quaternion)
+    assert go2.body_pose == BodyPose(0.01)
+    assert velocity.counts["poses_refused"] == 1

@@ -6,6 +6,7 @@ import json
 import math
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 from unittest.mock import patch
@@ -156,7 +157,7 @@ def test_a_motion_tells_its_progress_and_can_be_cancelled(go2: Any) -> None:
     assert go2.state().q[2] > 0.27
 
 
-def test_a_class_from_the_course_runs_unmodified(server: Process, probe: WatchingProbe) -> None:
+def test_a_class_from_the_course_runs_unmodified(probe: WatchingProbe) -> None:
     from tests.controller.bridges.student import StudentController
 
     student = StudentController()
@@ -181,8 +182,6 @@ def test_a_class_from_the_course_runs_unmodified(server: Process, probe: Watchin
 
 
 def test_somebody_else_may_spin_the_node(go2: Any) -> None:
-    import threading
-
     from rclpy.executors import SingleThreadedExecutor
 
     executor = SingleThreadedExecutor()

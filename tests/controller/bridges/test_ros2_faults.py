@@ -18,12 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 import pytest
 
 from benchmarks.bridges.processes import Process, wait_until
-from benchmarks.bridges.ros2_processes import (
-    ANSWER,
-    DISCOVERY,
-    quiet_client,
-    serving,
-)
+from benchmarks.bridges.ros2_processes import ANSWER, DISCOVERY, quiet_client, serving
 from tests.controller.bridges.ros2_graph import needs_ros2
 from tests.controller.bridges.ros2_probe import WatchingProbe
 

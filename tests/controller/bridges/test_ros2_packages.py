@@ -45,10 +45,7 @@ def run(command: list[str], folder: Path) -> Done:
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("go_sim")
     shutil.copytree(ROOT / "ros2" / PACKAGE, folder / "src" / PACKAGE)
-    built = run(
-        ["colcon", "build", "--packages-select", PACKAGE, "--symlink-install"],
-        folder,
-    )
+    built = run(["colcon", "build", "--packages-select", PACKAGE, "--symlink-install"], folder)
     assert built.returncode == 0, built.stdout
     return folder
 

@@ -89,16 +89,6 @@ def test_forward_kinematics_is_pinocchios(seed: int) -> None:
         np.testing.assert_allclose(foot, data.oMf[robot.getFrameId(name)].translation, atol=EXACT)
 
 
-@pytest.mark.parametrize("seed", range(10))
-def test_inverse_dynamics_is_the_equation_of_motion(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    state = random_state(rng)
-    a = rng.normal(size=18)
-    snapshot = MODEL.snapshot(state)
-    expected = snapshot.mass_matrix @ a + snapshot.bias
-    np.testing.assert_allclose(MODEL.inverse_dynamics(state.q, state.v, a), expected, atol=1e-9)
-
-
 def test_the_rotors_add_their_inertia_to_the_diagonal_of_the_joints_only() -> None:
     state = random_state(np.random.default_rng(2))
     geared = RobotModel().snapshot(state).mass_matrix

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from go2_wbc.legs import FOOT_NAMES, LEGS
+from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
@@ -143,24 +143,6 @@ def test_a_foot_without_contact_velocity_rolls_like_a_sphere_on_a_plane(seed: in
     expected = MODEL.foot_radius * np.cross(w, normal)
     np.testing.assert_allclose(rolled.v_world_feet, expected, atol=EXACT)
     assert np.abs(rolled.v_world_feet).max() > 1e-3
-
-
-def test_with_point_feet_the_contact_is_the_foot_frame() -> None:
-    snapshot = RobotModel(foot_radius=0.0).snapshot(random_state(np.random.default_rng(1)))
-    np.testing.assert_array_equal(snapshot.J_contacts, snapshot.J_feet)
-    np.testing.assert_array_equal(snapshot.drift_contacts, snapshot.drift_feet)
-    np.testing.assert_array_equal(snapshot.v_world_contacts, snapshot.v_world_feet)
-
-
-def test_a_foot_moves_with_the_base_and_its_own_leg_only() -> None:
-    _, _, snapshot = scene(0)
-    for leg in LEGS:
-        for J in (snapshot.J_feet[leg], snapshot.J_contacts[leg]):
-            others = np.ones(18, dtype=bool)
-            others[:6] = False
-            others[leg.velocities] = False
-            assert not J[:, others].any()
-            assert np.linalg.matrix_rank(J[:, leg.velocities]) == 3
 
 
 def test_a_snapshot_does_not_change_with_the_next_one() -> None:

@@ -18,7 +18,6 @@ from tests.engine_helpers import (
     FOUR_FEET,
     JO,
     MODES,
-    POLAR,
     ST,
     SW,
     cases,
@@ -116,15 +115,6 @@ def test_the_mirrored_robot_gets_the_mirrored_solution(backend: str) -> None:
         there = controller.solve(image, mirrored_reference(reference))
         np.testing.assert_allclose(there.tau, mirrored_joints(here.tau), atol=MIRRORED)
         np.testing.assert_allclose(there.forces, mirrored_feet(here.forces), atol=MIRRORED)
-
-
-def test_a_symmetric_stand_has_symmetric_torques() -> None:
-    symmetric = symmetric_model()
-    snapshot = symmetric.snapshot(state_of(standing_q()))
-    solution = WholeBodyController(symmetric).solve(snapshot, holding_reference(snapshot))
-    np.testing.assert_allclose(solution.tau, mirrored_joints(solution.tau), atol=MIRRORED)
-    np.testing.assert_allclose(solution.forces, mirrored_feet(solution.forces), atol=MIRRORED)
-    assert (solution.forces.sum(axis=0) * POLAR)[1] == pytest.approx(0.0, abs=MIRRORED)
 
 
 # --- limits under hard demands --------------------------------------------------------------------

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Reference, Target
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
@@ -48,29 +47,6 @@ def test_of_all_loads_that_act_at_that_point_the_most_even_are_taken(
     A = np.vstack([np.ones(feet), (places - middle).T / feet])
     more = np.linalg.lstsq(A, np.array([0.0, *(point - middle)]), rcond=1e-9)[0]
     np.testing.assert_allclose(relative_loads(places, point, OPEN[:feet]), 1 + more, atol=ROUNDING)
-
-
-@given(x=st.floats(-0.05, 0.05), y=st.floats(-0.04, 0.04))
-def test_the_loads_act_together_at_the_zero_moment_point(x: float, y: float) -> None:
-    loads = relative_loads(FEET, np.array([x, y]), OPEN)
-    assert loads.sum() == pytest.approx(4.0, abs=ROUNDING)
-    np.testing.assert_allclose(loads @ FEET / 4.0, [x, y], atol=ROUNDING)
-
-
-@pytest.mark.parametrize("leg", LEGS)
-def test_three_feet_share_a_load_as_the_lever_says(leg: Leg) -> None:
-    places = np.delete(FEET, leg, axis=0)
-    wanted = np.array([0.2, 0.3, 0.5])
-    loads = relative_loads(places, wanted @ places, OPEN[:3])
-    np.testing.assert_allclose(loads, 3.0 * wanted, atol=ROUNDING)
-
-
-def test_two_feet_share_a_load_by_where_it_lies_along_their_line() -> None:
-    places = FEET[[0, 3]]
-    aside = np.array([-places[0, 1], places[0, 0]])
-    for off in (0.0, 0.2):
-        loads = relative_loads(places, 0.25 * places[0] + off * aside, OPEN[:2])
-        np.testing.assert_allclose(loads, [1.25, 0.75], atol=ROUNDING)
 
 
 def test_a_load_is_never_far_from_the_mean_nor_above_what_a_foot_may_bear() -> None:

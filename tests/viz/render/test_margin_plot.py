@@ -72,18 +72,18 @@ def test_broken_limits_come_first_and_instants_are_dots() -> None:
 
 def test_the_png_shows_what_is_broken(tmp_path: Path) -> None:
     path = viz.export_plot(made_up_verdict(3.0), tmp_path / "m.png", title="t")
-    with Image.open(path) as image:
-        picture = np.asarray(image.convert("RGB")).reshape(-1, 3)
-    assert (picture == _FILL).all(axis=1).sum() > 2000
+    assert _filled(path) > 2000
     calm = replace(made_up_verdict(3.0), curves=made_up_verdict(3.0).curves[:1])
-    with Image.open(viz.export_plot(calm, tmp_path / "calm.png", title="t")) as image:
-        picture = np.asarray(image.convert("RGB")).reshape(-1, 3)
-    assert not (picture == _FILL).all(axis=1).any()
+    assert _filled(viz.export_plot(calm, tmp_path / "calm.png", title="t")) == 0
 
 
-def test_other_suffixes_and_empty_verdicts_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"valid: \.svg, \.png, \.pdf"):
-        viz.export_plot(made_up_verdict(3.0), tmp_path / "m.eps", title="t")
+def _filled(path: Path) -> int:
+    """Pixels between a curve and the limit that it breaks."""
+    with Image.open(path) as image:
+        return int((np.asarray(image.convert("RGB")) == _FILL).all(axis=2).sum())
+
+
+def test_empty_verdicts_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="no margin to plot"):
         viz.export_plot(replace(made_up_verdict(3.0), curves=()), tmp_path / "m.svg", title="t")
     assert list(tmp_path.iterdir()) == []

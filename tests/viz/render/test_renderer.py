@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,50 +12,59 @@ from go2_wbc.robot.model import FOOT_RADIUS
 from viz.render.camera import Camera
 from viz.render.floor import paint_floor
 from viz.render.mesh import Surface
-from viz.render.posed_robot import PosedRobot
 from viz.render.rasterizer import rasterize
 from viz.render.renderer import render, towards_lights
-from viz.render.robot_meshes import load_robot_visuals
+from viz.render.robot_meshes import PosedRobot, load_robot_visuals
 
 _TOUCH = 2.5  # [px] sole in the picture against the projected contact point
 
 
-def _standing() -> tuple[PosedRobot, np.ndarray]:
-    robot = PosedRobot(load_robot_visuals().simplified(0.008))
+@pytest.fixture(scope="module")
+def robot() -> PosedRobot:
+    return PosedRobot(load_robot_visuals().simplified(0.008))
+
+
+@pytest.fixture(scope="module")
+def q(robot: PosedRobot) -> np.ndarray:
+    """It stands on the floor."""
     q = np.concatenate([[0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0], np.tile([0.0, 0.8, -1.5], 4)])
     q[2] += FOOT_RADIUS - robot.feet(q)[:, 2].min()
-    return robot, q
+    return q
 
 
 def _camera(size: tuple[int, int] = (480, 300)) -> Camera:
     return Camera(np.array([0.0, 0.0, 0.2]), np.deg2rad(-52), np.deg2rad(17), 1.7, size)
 
 
+def _no_more(surface: Surface) -> Surface:
+    """Without a triangle."""
+    return replace(surface, triangles=surface.triangles[:0], colors=surface.colors[:0])
+
+
 @pytest.mark.parametrize("leg", LEGS)
-def test_each_foot_meets_the_floor_where_its_contact_point_is(leg: int) -> None:
-    robot, q = _standing()
+def test_each_foot_meets_the_floor_where_its_contact_point_is(
+    robot: PosedRobot, q: np.ndarray, leg: int
+) -> None:
     camera = _camera((960, 600))
     contact = robot.feet(q)[leg] - [0.0, 0.0, FOOT_RADIUS]
     surface = robot.at(q)
     near = np.linalg.norm(surface.points - contact, axis=1) < 2 * FOOT_RADIUS
     faces = surface.triangles[near[surface.triangles].all(axis=1)]
-    seen = rasterize(camera.project(surface.points), faces, camera.size)
-    lowest = seen.pixel.max() // camera.size[0]
+    pixels, _ = rasterize(camera.project(surface.points), faces, camera.size)
+    lowest = pixels.max() // camera.size[0]
     foot = camera.project(np.array([contact]))[0]
     sphere = camera.project(contact[None] + np.array([0.0, 0.0, FOOT_RADIUS]))[0]
     radius = FOOT_RADIUS * camera.focal_length * sphere[2]
     assert foot[1] - _TOUCH < lowest + 0.5 < sphere[1] + radius + _TOUCH
 
 
-def test_the_floor_is_darker_under_the_robot_than_beside_it() -> None:
-    robot, q = _standing()
+def test_the_floor_is_darker_under_the_robot_than_beside_it(
+    robot: PosedRobot, q: np.ndarray
+) -> None:
     light = towards_lights()[0]
     camera = _camera()
     with_shadow = paint_floor(camera, robot.at(q), light)
-    nothing = Surface(
-        robot.at(q).points, robot.at(q).normals, np.zeros((0, 3), dtype=int), np.zeros((0, 3))
-    )
-    without = paint_floor(camera, nothing, light)
+    without = paint_floor(camera, _no_more(robot.at(q)), light)
     column, row = (round(value) for value in camera.project(np.array([[0.0, 0.05, 0.0]]))[0, :2])
     assert with_shadow[row, column].max() < 0.7 * without[row, column].max()
     np.testing.assert_allclose(with_shadow[0], without[0], atol=1e-6)
@@ -69,22 +80,19 @@ def test_the_shadow_falls_away_from_the_light() -> None:
     light = np.array([0.6, 0.0, 0.8])
     camera = _camera()
     picture = paint_floor(camera, tower, light)
-    bare = paint_floor(
-        camera,
-        Surface(tower.points, tower.normals, tower.triangles[:0], tower.colors[:0]),
-        light,
-    )
+    bare = paint_floor(camera, _no_more(tower), light)
     row, column = np.unravel_index(np.argmin((picture / bare)[:, :, 0]), picture.shape[:2])
     darkest = camera.H_floor_picture @ [column + 0.5, row + 0.5, 1.0]
     np.testing.assert_allclose(darkest[:2] / darkest[2], [-0.3 * 0.75, 0.01], atol=0.02)
 
 
-def test_the_robot_covers_a_good_part_of_the_picture_with_its_own_colours() -> None:
-    robot, q = _standing()
+def test_the_robot_covers_a_good_part_of_the_picture_with_its_own_colours(
+    robot: PosedRobot, q: np.ndarray
+) -> None:
     camera = _camera()
     surface = robot.at(q)
     picture = render(camera, surface)
-    empty = render(camera, _raised(robot, q, 50.0))
+    empty = render(camera, _no_more(surface))
     changed = np.any(picture != empty, axis=2).mean()
     assert picture.shape == (300, 480, 3)
     assert 0.12 < changed < 0.6
@@ -92,14 +100,7 @@ def test_the_robot_covers_a_good_part_of_the_picture_with_its_own_colours() -> N
     assert np.abs(picture[0].astype(int) - empty[0]).max() == 0
 
 
-def _raised(robot: PosedRobot, q: np.ndarray, height: float) -> Surface:
-    """The robot far behind the camera's back: out of the picture."""
-    away = robot.at(q)
-    return Surface(away.points - [0.0, 0.0, height], away.normals, away.triangles, away.colors)
-
-
-def test_more_samples_only_smooth_the_edges() -> None:
-    robot, q = _standing()
+def test_more_samples_only_smooth_the_edges(robot: PosedRobot, q: np.ndarray) -> None:
     surface = robot.at(q)
     coarse = render(_camera(), surface, samples=1).astype(float)
     fine = render(_camera(), surface, samples=3).astype(float)

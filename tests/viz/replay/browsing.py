@@ -120,6 +120,15 @@ class Tab:
         """Words of the first element that a CSS selector finds."""
         return self.evaluate(f"document.querySelector('{selector}').textContent")
 
+    def click(self, selector: str) -> None:
+        """Click the first element that a CSS selector finds, also one that is covered."""
+        self.evaluate(f"document.querySelector('{selector}').click()")
+
+    def is_shown(self, selector: str) -> bool:
+        """Whether the page displays the first element that a CSS selector finds."""
+        shown = f"getComputedStyle(document.querySelector('{selector}')).display !== 'none'"
+        return self.evaluate(shown)
+
     def resize(self, width: int, height: int) -> None:
         """Give the window another size [px]."""
         self.page.set_viewport_size({"width": width, "height": height})

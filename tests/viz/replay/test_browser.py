@@ -3,29 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-import viz
 from go2_wbc.recording import Recording
 from tests.viz.replay.browsing import DRAWN, Tab
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+from tests.viz.replay.conftest import OpenPage
 
 _FRAME_TRAVEL = 0.006  # [m] the robot moves this far in half a frame
 
 
 @pytest.fixture(scope="module")
-def browser(
-    recording: Recording, chromium_browser: Browser, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Tab]:
-    file = tmp_path_factory.mktemp("browser") / "demo.html"
-    page = viz.export_html(recording, file, title="A walk")
-    with Tab(chromium_browser) as tab:
-        tab.open(page.as_uri())
+def browser(recording: Recording, open_page: OpenPage) -> Iterator[Tab]:
+    with open_page(recording) as tab:
         yield tab
 
 
@@ -80,17 +71,14 @@ def test_space_plays_and_pauses_and_arrows_step_by_one_frame(browser: Tab) -> No
 
 def test_the_readouts_follow_the_time(browser: Tab) -> None:
     browser.evaluate("replay.scrub(2.0)")
-    text = "document.getElementById('{}').textContent"
-    assert browser.evaluate(text.format("behaviour")) == "High five"
-    assert browser.evaluate(text.format("now")) == "2.00"
-    shown = browser.evaluate("document.querySelector('[data-curve=height] output').textContent")
+    assert browser.text("#behaviour") == "High five"
+    assert browser.text("#now") == "2.00"
     height = browser.evaluate("replay.data.q[19 * replay.data.frameAt(2.0) + 2]")
+    shown = browser.text("[data-curve=height] output")
     assert float(shown.split()[0]) == pytest.approx(100 * height, abs=0.06)
 
 
-def test_what_lies_on_the_floor_is_drawn_above_it_although_feet_press_into_it(
-    browser: Tab,
-) -> None:
+def test_what_lies_on_the_floor_is_drawn_above_it_although_feet_press_into_it(browser: Tab) -> None:
     lower = "replay.data.feet = replay.data.feet.map((value, i) => i % 3 === 2 ? value {} : value);"
     corners = "replay.scene.polygon.geometry.attributes.position"
     try:
@@ -104,9 +92,9 @@ def test_what_lies_on_the_floor_is_drawn_above_it_although_feet_press_into_it(
 def test_hiding_the_forces_changes_the_picture(browser: Tab) -> None:
     browser.evaluate("replay.scrub(0.1); replay.scene.setView('side')")
     shown = browser.stage()
-    browser.evaluate("document.querySelector('[data-toggle=forces]').click()")
+    browser.click("[data-toggle=forces]")
     hidden = browser.stage()
-    browser.evaluate("document.querySelector('[data-toggle=forces]').click()")
+    browser.click("[data-toggle=forces]")
     orange = (shown[:, :, 0] > 220) & (shown[:, :, 1] < 170) & (shown[:, :, 2] < 90)
     assert orange.sum() > 100
     assert np.abs(shown - hidden)[orange].mean() > 30
@@ -122,19 +110,6 @@ def test_the_camera_follows_the_robot(browser: Tab) -> None:
     after = browser.evaluate(ask.format(t=1.4))
     assert after[0] - before[0] == pytest.approx(after[1] - before[1], abs=_FRAME_TRAVEL)
     assert after[0] - before[0] > 0.1
-
-
-def test_the_page_fits_a_narrow_window(browser: Tab) -> None:
-    browser.resize(640, 860)
-    app = "document.getElementById('app')"
-    overflow = f"{app}.scrollWidth > innerWidth || {app}.scrollHeight > innerHeight"
-    assert browser.evaluate(overflow) is False
-    pane = browser.evaluate(
-        "(({width, height}) => [width, height])"
-        "(document.querySelector('#pane canvas').getBoundingClientRect())"
-    )
-    assert pane[0] == pytest.approx(626, abs=6)
-    assert pane[1] > 250
 
 
 def test_every_place_where_a_foot_came_down_has_its_footprint(

@@ -6,7 +6,8 @@ import http.client
 import json
 import socket
 import sys
-from collections.abc import Iterator
+import threading
+from collections.abc import Iterator, Mapping
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -21,8 +22,14 @@ from viz.replay.preview_server import PreviewServer
 
 
 @pytest.fixture
-def server(recording: Recording) -> Iterator[PreviewServer]:
-    with PreviewServer(ReplayContent(recording), "A <plan>", 0) as opened:
+def chosen() -> list[object]:
+    """What pages have sent to ``server``."""
+    return []
+
+
+@pytest.fixture
+def server(recording: Recording, chosen: list[object]) -> Iterator[PreviewServer]:
+    with PreviewServer(ReplayContent(recording), "A <plan>", 0, chosen.append) as opened:
         yield opened
 
 
@@ -30,94 +37,93 @@ def _port(server: PreviewServer) -> int:
     return urlsplit(server.url).port or 0
 
 
-def _get(server: PreviewServer, path: str, host: str | None = None) -> tuple[int, str]:
+def _ask(
+    server: PreviewServer,
+    what: str,
+    body: bytes | None = None,
+    headers: Mapping[str, str] | None = None,
+) -> tuple[int, str]:
+    """Status and text of the answer to a method and path."""
     connection = http.client.HTTPConnection("127.0.0.1", _port(server), timeout=30)
-    connection.request("GET", path, headers={} if host is None else {"Host": host})
+    method, path = what.split()
+    connection.request(method, path, body, headers or {})
     answer = connection.getresponse()
     text = answer.read().decode()
     connection.close()
     return answer.status, text
 
 
+def _post(server: PreviewServer, path: str, body: bytes, **headers: str) -> int:
+    own = {"Origin": f"http://127.0.0.1:{_port(server)}"}
+    return _ask(server, f"POST {path}", body, {**own, **headers})[0]
+
+
 def test_it_answers_with_the_page_and_its_data(server: PreviewServer) -> None:
-    status, page = _get(server, "/")
+    status, page = _ask(server, "GET /")
     assert status == 200
     assert "<title>A &lt;plan&gt;</title>" in page
     assert "EventSource" in page
-    status, data = _get(server, "/data")
+    status, data = _ask(server, "GET /data")
     assert status == 200
     assert data in page
-    assert _get(server, "/etc/passwd")[0] == 404
-    assert _get(server, "/../pyproject.toml")[0] == 404
+    assert _ask(server, "GET /etc/passwd")[0] == 404
+    assert _ask(server, "GET /../pyproject.toml")[0] == 404
 
 
 @pytest.mark.parametrize(
     "host", ["evil.example", "evil.example:{}", "127.0.0.1.evil.example:{}", "10.0.0.1:{}", ""]
 )
-def test_other_names_of_this_machine_are_refused(server: PreviewServer, host: str) -> None:
-    for path in ("/", "/data", "/events"):
-        status, text = _get(server, path, host.format(_port(server)))
-        assert status == 403
-        assert text == "only for this machine\n"
+@pytest.mark.parametrize("path", ["/", "/data", "/events"])
+def test_other_names_of_this_machine_are_refused(
+    server: PreviewServer, host: str, path: str
+) -> None:
+    refused = _ask(server, f"GET {path}", headers={"Host": host.format(_port(server))})
+    assert refused == (403, "only for this machine\n")
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1:{}", "localhost:{}", "[::1]:{}"])
 def test_the_loopbacks_own_names_are_accepted(server: PreviewServer, host: str) -> None:
-    assert _get(server, "/data", host.format(_port(server)))[0] == 200
+    assert _ask(server, "GET /data", headers={"Host": host.format(_port(server))})[0] == 200
 
 
-def _post(
-    server: PreviewServer, path: str, body: bytes, headers: dict[str, str] | None = None
-) -> int:
-    connection = http.client.HTTPConnection("127.0.0.1", _port(server), timeout=30)
-    own = {"Origin": f"http://127.0.0.1:{_port(server)}"}
-    connection.request("POST", path, body=body, headers={**own, **(headers or {})})
-    status = connection.getresponse().status
-    connection.close()
-    return status
-
-
-def test_values_that_a_page_sends_are_handed_on(recording: Recording) -> None:
-    chosen: list[object] = []
-    with PreviewServer(ReplayContent(recording), "A plan", 0, chosen.append) as server:
-        body = b'{"angle": 0.2, "times": 3, "side": "left"}'
-        assert _post(server, "/parameters", body) == 200
-        assert chosen == [{"angle": 0.2, "times": 3, "side": "left"}]
+def test_values_that_a_page_sends_are_handed_on(
+    server: PreviewServer, chosen: list[object]
+) -> None:
+    assert _post(server, "/parameters", b'{"angle": 0.2, "times": 3, "side": "left"}') == 200
+    assert chosen == [{"angle": 0.2, "times": 3, "side": "left"}]
 
 
 @pytest.mark.parametrize(
     "body", [b"", b"{", b"[1]", b'{"a": [1]}', b'{"a": true}', b'{"a": null}', b" " * 5000]
 )
-def test_what_is_no_values_is_refused(recording: Recording, body: bytes) -> None:
-    chosen: list[object] = []
-    with PreviewServer(ReplayContent(recording), "A plan", 0, chosen.append) as server:
-        assert _post(server, "/parameters", body) == 400
+def test_what_is_no_values_is_refused(
+    server: PreviewServer, chosen: list[object], body: bytes
+) -> None:
+    assert _post(server, "/parameters", body) == 400
     assert chosen == []
 
 
 @pytest.mark.parametrize(
-    "headers",
+    ("name", "value"),
     [
-        {"Origin": "http://evil.example"},
-        {"Origin": ""},
-        {"Origin": "null"},
-        {"Host": "evil.example"},
+        ("Origin", "http://evil.example"),
+        ("Origin", ""),
+        ("Origin", "null"),
+        ("Host", "evil.example"),
     ],
 )
-def test_other_web_sites_cannot_send_values(recording: Recording, headers: dict[str, str]) -> None:
-    chosen: list[object] = []
-    with PreviewServer(ReplayContent(recording), "A plan", 0, chosen.append) as server:
-        assert _post(server, "/parameters", b'{"angle": 0.2}', headers) == 403
+def test_other_web_sites_cannot_send_values(
+    server: PreviewServer, chosen: list[object], name: str, value: str
+) -> None:
+    assert _post(server, "/parameters", b'{"angle": 0.2}', **{name: value}) == 403
     assert chosen == []
 
 
-def test_nothing_else_can_be_sent(server: PreviewServer) -> None:
+def test_nothing_else_can_be_sent(server: PreviewServer, recording: Recording) -> None:
     assert _post(server, "/data", b"x") == 404
-    assert _post(server, "/parameters", b"{}") == 404  # this motion has none
-    connection = http.client.HTTPConnection("127.0.0.1", _port(server), timeout=30)
-    connection.request("PUT", "/data", body=b"x")
-    assert connection.getresponse().status == 501
-    connection.close()
+    assert _ask(server, "PUT /data", b"x")[0] == 501
+    with PreviewServer(ReplayContent(recording), "t", 0) as without_parameters:
+        assert _post(without_parameters, "/parameters", b"{}") == 404
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere 127.0.0.2 is no address")
@@ -138,10 +144,11 @@ def test_what_is_published_is_told_and_served(server: PreviewServer, recording: 
     third = json.loads(server.next_state(json.dumps(second)) or "")
     assert third["version"] != first["version"]
     assert third["error"] is None
-    header, _ = read_pack(_unpacked(_get(server, "/data")[1]))
+    block = f'<script type="text/plain" id="replay-data">{_ask(server, "GET /data")[1]}</script>'
+    header, _ = read_pack(packed_parts(block)["replay-data"])
     assert header["version"] == third["version"]
     assert header["verdict"]["ok"] is False
-    page_header, arrays = read_data(_get(server, "/")[1])
+    page_header, arrays = read_data(_ask(server, "GET /")[1])
     assert page_header["version"] == third["version"]
     assert np.isfinite(arrays["q"]).all()
 
@@ -160,6 +167,15 @@ def test_pages_hear_at_once_and_hear_the_end(recording: Recording) -> None:
     connection.close()
 
 
+def test_the_server_works_in_daemon_threads_only(recording: Recording) -> None:
+    """A preview that nobody closed does not keep the process alive."""
+    before = set(threading.enumerate())
+    with PreviewServer(ReplayContent(recording), "t", 0):
+        started = set(threading.enumerate()) - before
+        assert started
+        assert all(thread.daemon for thread in started)
+
+
 def test_a_port_in_use_is_named(server: PreviewServer, recording: Recording) -> None:
     port = _port(server)
     with pytest.raises(ConfigError, match=f"cannot listen on port {port} of 127.0.0.1"):
@@ -169,8 +185,3 @@ def test_a_port_in_use_is_named(server: PreviewServer, recording: Recording) -> 
 def test_a_port_out_of_range_is_refused(recording: Recording) -> None:
     with pytest.raises(ConfigError, match="port 70000 is not valid"):
         PreviewServer(ReplayContent(recording), "t", 70_000)
-
-
-def _unpacked(text: str) -> bytes:
-    block = f'<script type="text/plain" id="replay-data">{text}</script>'
-    return packed_parts(block)["replay-data"]

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import pytest
 
-import viz
 from go2_wbc.recording import Recording
 from motions.music import click_track
 from tests.viz.replay.browsing import Tab
+from tests.viz.replay.conftest import OpenPage
 from viz.content import ReplayContent
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser
 
 IN_STEP = 0.035
 """s; the page lets the picture be 0.03 s off the music, and the music goes on while it looks."""
@@ -31,13 +27,8 @@ WATCH = """(() => {
 
 
 @pytest.fixture(scope="module")
-def tab(
-    recording: Recording, chromium_browser: Browser, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Tab]:
-    content = ReplayContent(recording, sound=click_track(120.0, 6.0).wav())
-    page = viz.export_html(content, tmp_path_factory.mktemp("page") / "dance.html", title="dance")
-    with Tab(chromium_browser) as opened:
-        opened.open(page.as_uri())
+def tab(recording: Recording, open_page: OpenPage) -> Iterator[Tab]:
+    with open_page(ReplayContent(recording, sound=click_track(120.0, 6.0).wav())) as opened:
         opened.evaluate(WATCH)
         yield opened
 
@@ -80,13 +71,10 @@ def test_the_music_can_be_silent_and_still_leads(tab: Tab) -> None:
     assert not tab.evaluate("replay.sound.audio.muted")
 
 
-def test_a_page_without_music_plays_by_itself(
-    recording: Recording, chromium_browser: Browser, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    page = viz.export_html(recording, tmp_path_factory.mktemp("page") / "run.html", title="run")
-    with Tab(chromium_browser) as opened:
+def test_a_page_without_music_plays_by_itself(recording: Recording, open_page: OpenPage) -> None:
+    with open_page(recording) as opened:
         opened.page.emulate_media(reduced_motion="no-preference")
-        opened.open(page.as_uri())
+        opened.open(opened.page.url)
         assert opened.evaluate("replay.isPlaying")
         assert opened.evaluate("replay.sound.audio === null")
         opened.wait_for("replay.time > 0.2")

@@ -19,8 +19,8 @@ from benchmarks.bridges.unitree_processes import (
     simulator,
     tilt_of,
 )
-from controller.bridges.unitree.codec import encode_message
 from controller.bridges.unitree.low_level import low_cmd_message
+from controller.bridges.unitree.messages import encode_message
 from controller.bridges.unitree.sport_api import SWITCHER_SERVICE, Api, Code, SwitcherApi
 from go2_wbc.robot.state import JointCommand
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from controller.behaviours.joints import DAMPING
-from controller.bridges.unitree import layout
-from controller.bridges.unitree.codec import encode_message
+from controller.bridges.unitree import messages
 from controller.bridges.unitree.low_level import RELEASE, SILENCE, CommandGate
+from controller.bridges.unitree.messages import encode_message
 from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand
@@ -32,14 +32,14 @@ def sample(
     change: Callable[[np.ndarray], None] = lambda message: None, *, sealed: bool = True
 ) -> bytes:
     """A good command: the front right thigh held at 0.8 rad, the rest damped; then changed."""
-    message = layout.new_message(layout.LOW_CMD)
+    message = np.zeros(1, messages.LOW_CMD)
     motors = message["motor_cmd"]
-    motors["mode"][0, :12] = layout.SERVO
-    motors["q"][0, :12], motors["kd"][0, :12] = layout.POSITION_STOP, 2.0
+    motors["mode"][0, :12] = messages.SERVO
+    motors["q"][0, :12], motors["kd"][0, :12] = messages.POSITION_STOP, 2.0
     motors["q"][0, 1], motors["kp"][0, 1], motors["tau"][0, 1] = 0.8, 30.0, 4.0
     if sealed:
         change(message)
-    layout.seal(message)
+    messages.seal(message)
     if not sealed:
         change(message)
     return encode_message(message)

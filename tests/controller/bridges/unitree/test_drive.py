@@ -15,6 +15,7 @@ from benchmarks.bridges.processes import wait_until
 from benchmarks.bridges.unitree import measure_drive
 from benchmarks.bridges.unitree_processes import own_domain, simulator
 from controller.bridges.unitree.guards import GuardConfig
+from controller.bridges.unitree.plant import UnitreePlant
 from controller.sweeps.trials import Trial
 from go2_wbc.errors import CommandError, PlantTimeout
 from go2_wbc.plant.base import Plant
@@ -57,8 +58,6 @@ def domain() -> Iterator[int]:
 class TestUnitreePlant(PlantContract):
     @pytest.fixture
     def plant(self, domain: int) -> Iterator[Plant]:
-        from controller.bridges.unitree.plant import UnitreePlant
-
         plant = UnitreePlant("lo", domain, i_have_the_remote_in_hand=True, guards=PATIENT)
         yield plant
         plant.close()
@@ -81,15 +80,11 @@ def test_in_lockstep_garbage_lets_no_time_pass() -> None:
 
 @needs_dds
 def test_a_robot_that_is_not_there_is_named() -> None:
-    from controller.bridges.unitree.plant import UnitreePlant
-
     with pytest.raises(PlantTimeout, match="no rt/lowstate on DDS domain 9, interface lo"):
         UnitreePlant("lo", 9, i_have_the_remote_in_hand=True)
 
 
 def test_without_consent_nothing_is_touched() -> None:
-    from controller.bridges.unitree.plant import UnitreePlant
-
     with pytest.raises(CommandError, match="--i-have-the-remote-in-hand"):
         UnitreePlant("lo", 1)
 

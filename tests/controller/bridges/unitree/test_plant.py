@@ -14,11 +14,10 @@ import pytest
 
 from benchmarks.bridges.processes import wait_until
 from controller import GO2Controller
-from controller.bridges.unitree import layout
-from controller.bridges.unitree.codec import decode_message, encode_message
+from controller.bridges.unitree import messages
 from controller.bridges.unitree.guards import GuardConfig
-from controller.bridges.unitree.layout import seal
 from controller.bridges.unitree.low_level import low_cmd_message, low_state_message
+from controller.bridges.unitree.messages import decode_message, encode_message, seal
 from controller.bridges.unitree.plant import UnitreePlant
 from go2_wbc.errors import (
     CommandError,
@@ -83,7 +82,7 @@ class Robot:
         return [encode_message(message)]
 
     def write(self, data: bytes) -> None:
-        self.commands.append(decode_message(layout.LOW_CMD, data))
+        self.commands.append(decode_message(messages.LOW_CMD, data))
 
     def is_damped_since(self, start: int) -> bool:
         """Whether many commands come from then on, and all of them brake."""
@@ -115,8 +114,7 @@ def guards() -> GuardConfig:
 @pytest.fixture
 def plant(robot: Robot, guards: GuardConfig) -> Iterator[Plant]:
     plant = driven(guards)
-    for _ in range(5):
-        plant.write(PUSH)
+    write_often(plant)
     assert robot.commands[-1]["motor_cmd"]["tau"].any()
     yield plant
     plant.close()
@@ -137,6 +135,10 @@ def overstretched(message: np.ndarray) -> None:
 
 def broken(message: np.ndarray) -> None:
     message["motor_state"]["q"][0, 3] = np.nan
+
+
+def standing(message: np.ndarray) -> None:
+    message["motor_state"]["q"][0, :12] = np.tile([0.0, 0.67, -1.3], 4)
 
 
 def restarted(message: np.ndarray) -> None:
@@ -233,30 +235,20 @@ def names_of_threads() -> list[str]:
     return [thread.name for thread in threading.enumerate()]
 
 
-def test_a_robot_that_does_not_lie_is_sent_nothing(robot: Robot) -> None:
-    def standing(message: np.ndarray) -> None:
-        message["motor_state"]["q"][0, :12] = np.tile([0.0, 0.67, -1.3], 4)
-
-    robot.change = standing
-    with pytest.raises(PlantError, match="must lie on its belly"):
-        driven(PATIENT)
-    assert robot.commands == []
-
-
-def test_a_robot_that_measures_no_finite_joint_angle_is_sent_nothing(robot: Robot) -> None:
-    robot.change = broken
-    with pytest.raises(PlantError, match="must lie on its belly"):
-        driven(PATIENT)
-    assert robot.commands == []
-
-
-def test_a_robot_that_gets_up_while_it_is_taken_over_is_let_go(
-    robot: Robot, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("at_first", "when_taken_over"), [(standing, None), (broken, None), (None, tilted)]
+)
+def test_a_robot_that_does_not_lie_or_gets_up_while_it_is_taken_over_is_sent_nothing(
+    robot: Robot,
+    monkeypatch: pytest.MonkeyPatch,
+    at_first: Change | None,
+    when_taken_over: Change | None,
 ) -> None:
-    def get_up(*args: object) -> None:
-        robot.change = tilted
+    def take_over(*_: object) -> None:
+        robot.change = when_taken_over or robot.change
 
-    monkeypatch.setattr(UnitreePlant, "_release_sport", get_up)
+    robot.change = at_first or robot.change
+    monkeypatch.setattr(UnitreePlant, "_release_sport", take_over)
     with pytest.raises(PlantError, match="must lie on its belly"):
         driven(PATIENT)
     assert robot.commands == []

@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks.bridges.processes import wait_until
 from controller.bridges.unitree import sport_api, sport_robot, sport_service
-from controller.bridges.unitree.codec import Request
+from controller.bridges.unitree.messages import Request
 from controller.bridges.unitree.sport_api import Api, Code, SportMode
 from controller.bridges.unitree.sport_robot import MOTIONS, WALKS, SportRobot
 from controller.bridges.unitree.sport_service import WAITING, SportService
@@ -238,6 +238,7 @@ def test_what_the_library_has_no_motion_for_is_not_supported(stage: Stage) -> No
 
 
 def test_at_least_twenty_eight_calls_do_what_they_say() -> None:
+    assert WALKS[Api.FREE_BOUND] == "bound"
     there = motion_names()
     calls = {api for api in Api if api >= Api.DAMP}
     lacking = {api for api, name in MOTIONS.items() if name not in there}
@@ -263,21 +264,15 @@ def test_a_motion_that_cannot_be_compiled_here_is_not_supported(
     assert "HEART will not be supported: install the extra" in caplog.text
 
 
-def test_cross_step_is_switched_on_and_off(stage: Stage) -> None:
-    assert stage.code(Api.CROSS_STEP, '{"data": true}') == Code.OK
-    assert stage.code(Api.CROSS_STEP, '{"data": false}') == Code.OK
-    performed = [call.args[0] for call in stage.robot.perform.call_args_list]
-    assert performed == [Api.CROSS_STEP, Api.BALANCE_STAND]
-
-
-def test_free_bound_bounds_and_goes_back_to_the_trot(stage: Stage) -> None:
-    assert stage.code(Api.FREE_BOUND, '{"data": true}') == Code.OK
-    assert stage.code(Api.FREE_BOUND, '{"data": false}') == Code.OK
-    performed = [call.args[0] for call in stage.robot.perform.call_args_list]
-    assert performed == [Api.FREE_BOUND, Api.TROT_RUN]
-    assert WALKS[Api.FREE_BOUND] == "bound"
+@pytest.mark.parametrize(
+    ("api", "after"), [(Api.CROSS_STEP, Api.BALANCE_STAND), (Api.FREE_BOUND, Api.TROT_RUN)]
+)
+def test_what_is_switched_on_is_switched_off_again(stage: Stage, api: Api, after: Api) -> None:
+    assert stage.code(api, '{"data": true}') == Code.OK
+    assert stage.code(api, '{"data": false}') == Code.OK
+    assert [call.args[0] for call in stage.robot.perform.call_args_list] == [api, after]
     with pytest.raises(CommandError, match="true or false"):
-        stage.ask(Api.FREE_BOUND, "{}")
+        stage.ask(api, "{}")
 
 
 def test_the_speed_level_and_the_recovery_can_be_asked_for(stage: Stage) -> None:

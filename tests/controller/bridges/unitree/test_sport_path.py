@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controller.bridges.unitree.sport_path import ARRIVAL_TIME, SportPath
+from controller.bridges.unitree.sport_robot import ARRIVAL_TIME, SportPath
 from controller.navigation import APPROACH
 from go2_wbc.robot.state import RobotState
 from tests.controller.plants import lying_state

@@ -39,12 +39,7 @@ def main() -> None:
         error = max(abs(a - b) for a, b in zip(last.motor.q, STANDING, strict=True))
     print(
         json.dumps(
-            {
-                "start": start,
-                "accelerometer": first.imu.accel[2],
-                "error": error,
-                "sent": sent,
-            }
+            {"start": start, "accelerometer": first.imu.accel[2], "error": error, "sent": sent}
         ),
         flush=True,
     )

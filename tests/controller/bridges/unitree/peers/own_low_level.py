@@ -12,11 +12,10 @@ import time
 
 import numpy as np
 
-from controller.bridges.unitree import layout
+from controller.bridges.unitree import messages
 from controller.bridges.unitree.bus import Bus
-from controller.bridges.unitree.codec import decode_message, encode_message
-from controller.bridges.unitree.layout import is_intact, seal
 from controller.bridges.unitree.low_level import low_cmd_message
+from controller.bridges.unitree.messages import decode_message, encode_message, is_intact, seal
 from go2_wbc.robot.state import JointCommand
 
 LIMIT, PERIOD = 60.0, 0.002
@@ -31,8 +30,8 @@ def main() -> None:
     commands = bus.writer("rt/lowcmd")
     states = bus.writer("rt/lowstate")
     command = low_cmd_message(JointCommand.servo(ANGLES, np.zeros(12), 20.0, 1.0))
-    state = layout.new_message(layout.LOW_STATE)
-    state["head"], state["foot_force"] = layout.HEAD, 77
+    state = np.zeros(1, messages.LOW_STATE)
+    state["head"], state["foot_force"] = messages.HEAD, 77
     seal(state)
     for message in (command, state):
         message["crc"] ^= mask
@@ -43,7 +42,7 @@ def main() -> None:
         commands.write(encode_message(command))
         states.write(encode_message(state))
         for data in reader.take():
-            message = decode_message(layout.LOW_STATE, data)
+            message = decode_message(messages.LOW_STATE, data)
             if message["foot_force"][0, 0] != 77:  # the peer's, not our own
                 counts["intact" if is_intact(message) else "broken"] += 1
         time.sleep(PERIOD)

@@ -1,7 +1,9 @@
-"""Every export refuses a path that it cannot write, before the work."""
+"""``import viz`` is cheap, drawing knows no pages, exports refuse a path before the work."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,12 +12,34 @@ import pytest
 import viz
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
+from tests.viz.verdicts import made_up_verdict
 
+ROOT = Path(__file__).resolve().parents[2]
 _EXPORTS: dict[str, Callable[[Recording, Path], Path]] = {
     ".html": lambda recording, path: viz.export_html(recording, path, title="t"),
     ".webp": lambda recording, path: viz.export_animation(recording, path),
     ".png": lambda recording, path: viz.export_filmstrip(recording, path),
+    ".svg": lambda _recording, path: viz.export_plot(made_up_verdict(3.0), path, title="t"),
 }
+
+
+@pytest.mark.parametrize(
+    ("asked", "absent"),
+    [
+        ("import viz", "trimesh"),
+        ("import viz; viz.export_html, viz.export_animation", "matplotlib"),
+        ("import viz; viz.export_animation, viz.export_filmstrip, viz.export_plot", "viz.replay"),
+    ],
+)
+def test_what_is_not_asked_for_is_not_imported(asked: str, absent: str) -> None:
+    code = f"import sys; {asked}; sys.exit({absent!r} in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
+
+
+def test_a_name_that_viz_does_not_have_is_an_attribute_error() -> None:
+    assert all(hasattr(viz, name) for name in viz.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'export_film'"):
+        _ = viz.export_film
 
 
 @pytest.mark.parametrize("suffix", _EXPORTS)

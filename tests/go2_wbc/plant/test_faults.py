@@ -1,0 +1,87 @@
+"""What is broken on a simulated robot reads, or gives, what was said; what cannot be is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from go2_wbc.errors import CommandError
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.faults import FaultKind
+from go2_wbc.robot.state import JointCommand
+from tests.go2_wbc.plant.helpers import STAND, stand_up
+
+HOLD = JointCommand.servo(STAND, np.zeros(12), 60.0, 2.0)
+
+
+def test_a_dead_motor_gives_nothing_from_its_time_on() -> None:
+    plant = MujocoPlant()
+    stand_up(plant)
+    plant.fault("motor", part="FL_calf_joint", at=plant.time + 0.1)
+    plant.write(HOLD)
+    assert abs(plant.read().tau[2]) > 3.0
+    for _ in range(60):
+        plant.write(HOLD)
+    assert plant.read().tau[2] == 0.0
+    assert plant.model.nu == 12
+    assert plant.data.ctrl[2] == 0.0
+
+
+def test_a_weak_motor_gives_its_share() -> None:
+    sound, weak = MujocoPlant(), MujocoPlant()
+    for plant in (sound, weak):
+        stand_up(plant)
+    weak.fault("motor", part="RR_thigh_joint", value=0.5)
+    for plant in (sound, weak):
+        plant.write(HOLD)
+    assert weak.read().tau[10] == pytest.approx(0.5 * sound.read().tau[10], rel=0.1)
+
+
+@pytest.mark.parametrize("sensors", ["ideal", "imu"])
+def test_the_watch_puts_right_what_a_sensor_reads_wrong(sensors: str) -> None:
+    plant = MujocoPlant(sensors=sensors)
+    stand_up(plant)
+    for kind, part in (("encoder", "FL_calf_joint"), ("foot_force", "RR_foot"), ("gyro", "y")):
+        plant.fault(kind, part=part)
+    for _ in range(300):
+        plant.write(HOLD)
+        plant.read()
+    truth, seen = plant.truth(), plant.read()
+    assert seen.q[9] == pytest.approx(truth.q[9], abs=0.01)
+    assert seen.foot_forces[3] == pytest.approx(truth.foot_forces[3], abs=8.0)
+    assert np.abs(seen.v[3:6] - truth.v[3:6]).max() < 0.15
+    named = {fault.part for fault in plant.sensor_faults}
+    assert named == {"FL_calf_joint", "RR_foot", "gyro"}
+
+
+def test_one_reading_that_is_not_a_number_is_not_seen() -> None:
+    plant = MujocoPlant(sensors="imu")
+    stand_up(plant)
+    for part in ("FL_calf_joint", "RR_foot", "x"):
+        plant.fault("not_a_number", part=part)
+        for _ in range(5):
+            plant.write(HOLD)
+            assert np.isfinite(plant.read().q).all()
+    assert plant.sensor_faults == ()
+
+
+def test_a_share_of_the_states_does_not_arrive() -> None:
+    plant = MujocoPlant(seed=1)
+    stand_up(plant)
+    plant.fault("lost_packets", value=0.2)
+    times = []
+    for _ in range(500):
+        plant.write(HOLD)
+        times.append(plant.read().time)
+    assert np.mean(np.diff(times) == 0.0) == pytest.approx(0.2, abs=0.06)
+
+
+def test_what_cannot_break_is_refused_with_what_can() -> None:
+    plant = MujocoPlant()
+    with pytest.raises(CommandError, match="unknown kind of fault 'wheel'; valid: "):
+        plant.fault("wheel")
+    with pytest.raises(CommandError, match="unknown part for 'motor' 'FL_foot'; valid: "):
+        plant.fault("motor", part="FL_foot")
+    with pytest.raises(CommandError, match="finite numbers"):
+        plant.fault("gyro", value=np.inf)
+    assert {kind.value for kind in FaultKind} >= {"motor", "encoder", "gyro", "foot_force"}

@@ -1,0 +1,165 @@
+"""Which sensor is broken is found from the others; a sound robot's readings are left alone."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from go2_wbc.compilation import plain
+from go2_wbc.legs import FOOT_NAMES
+from go2_wbc.robot.leg_kinematics import leg_table
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.sensor_watch import SensorWatch, leg_motion, less_rolling
+from go2_wbc.robot.state import PartFault, SensorReading
+
+MODEL = RobotModel()
+STANDING = np.tile([0.05, 0.8, -1.6], 4)
+LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
+DT = 0.002
+
+
+def standing_torques() -> np.ndarray:
+    """That hold a quarter of the robot on each foot, of legs without weight."""
+    geometry = leg_table(MODEL).geometry
+    columns = []
+    for leg in range(4):
+        q = tuple(STANDING[3 * leg : 3 * leg + 3])
+        unit = np.eye(3)
+        forces = [plain(leg_motion)(geometry[leg], q, (0.0,) * 3, tuple(e))[2] for e in unit]
+        weight = np.array([0.0, 0.0, 0.25 * MODEL.mass * MODEL.gravity])
+        columns.append(np.linalg.solve(np.array(forces).T, weight))
+    return np.concatenate(columns)
+
+
+def reading(step: int, **changes: np.ndarray) -> SensorReading:
+    """Of a robot that stands on four feet, with a sensor's noise in its forces."""
+    forces = 39.0 + np.array([step % 3, step % 2, (step + 1) % 3, (step + 1) % 2], dtype=float)
+    v = np.full(12, 1e-4 * (step % 2))
+    sound = SensorReading(
+        DT * step, np.zeros(3), np.array([0.0, 0.0, 9.81]), STANDING, v, standing_torques(), forces
+    )
+    return replace(sound, **changes)
+
+
+def watched(*readings: SensorReading) -> tuple[SensorReading, tuple[PartFault, ...]]:
+    """The last as it is passed on, and what was found to be broken."""
+    watch = SensorWatch(MODEL)
+    last = readings[0]
+    for one in readings:
+        last = watch.checked(one, LEVEL)
+    return last, watch.faults
+
+
+# --- what is taken of a leg ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("leg", range(4))
+def test_a_legs_motion_and_force_are_pinocchios(leg: int) -> None:
+    rng = np.random.default_rng(leg)
+    model, data = MODEL.pin_model, MODEL.pin_model.createData()
+    for _ in range(20):
+        q, v = pin.neutral(model), np.zeros(18)
+        q[7:] = STANDING + rng.uniform(-0.5, 0.5, 12)
+        v[6:], tau = rng.uniform(-5.0, 5.0, 12), rng.uniform(-20.0, 20.0, 12)
+        joints = slice(3 * leg, 3 * leg + 3)
+        frame = model.getFrameId(FOOT_NAMES[leg])
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+        J = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[:3, 6:][:, joints]
+        given = (tuple(q[7:][joints]), tuple(v[6:][joints]), tuple(tau[joints]))
+        place, u, force = plain(leg_motion)(leg_table(MODEL).geometry[leg], *given)
+        assert place == pytest.approx(data.oMf[frame].translation, abs=1e-6)
+        assert u == pytest.approx(J @ v[6:][joints], abs=1e-5)
+        assert J.T @ np.array(force) == pytest.approx(-tau[joints], abs=1e-3)
+
+
+def test_a_foot_that_rolls_has_the_velocity_of_the_point_that_touches() -> None:
+    """A calf that turns about y by 2 rad/s rolls its foot's centre ahead by 2 r."""
+    moved = plain(less_rolling)(
+        (0.0, 0.8, -1.6), (0.0, 3.0, -1.0), (0.04, 0.0, 0.0), (0.0,) * 3, (0.0, 0.0, 1.0), 0.02
+    )
+    assert moved == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
+
+
+# --- readings -----------------------------------------------------------------------------------
+
+
+def test_a_sound_robots_readings_leave_as_they_came() -> None:
+    readings = [reading(step) for step in range(400)]
+    last, faults = watched(*readings)
+    assert faults == ()
+    for field in fields(SensorReading):
+        assert np.array_equal(getattr(last, field.name), getattr(readings[-1], field.name))
+
+
+@pytest.mark.parametrize("name", ["gyro", "q_joints", "v_joints", "foot_forces", "accelerometer"])
+def test_what_is_not_a_number_is_what_it_was(name: str) -> None:
+    before, bad = reading(10), reading(11)
+    value = getattr(bad, name).copy()
+    value[1] = np.nan
+    last, faults = watched(*(reading(k) for k in range(10)), before, replace(bad, **{name: value}))
+    assert getattr(last, name)[1] == getattr(before, name)[1]
+    assert faults == ()
+
+
+def test_a_jump_of_an_encoder_is_named_and_taken_off() -> None:
+    off = STANDING.copy()
+    off[4] += 0.1
+    last, faults = watched(*(reading(k, q_joints=STANDING if k < 50 else off) for k in range(60)))
+    assert [fault.part for fault in faults] == ["FR_thigh_joint"]
+    assert faults[0].is_survived
+    assert last.q_joints == pytest.approx(STANDING, abs=1e-6)
+
+
+def test_an_encoder_that_stays_while_its_leg_turns_is_stuck() -> None:
+    moving = [
+        reading(k, q_joints=STANDING + 1e-3 * k * (np.arange(12) != 2), v_joints=np.full(12, 0.5))
+        for k in range(100)
+    ]
+    _, faults = watched(*moving)
+    (stuck,) = (fault for fault in faults if fault.part != "gyro")  # no foot stands on such a leg
+    assert stuck.part == "FL_calf_joint"
+    assert not stuck.is_survived
+    assert stuck.since < 0.2
+
+
+@pytest.mark.parametrize("value", [0.0, 44.0])
+def test_a_foots_dead_or_stuck_sensor_gives_way_to_the_legs_torques(value: float) -> None:
+    def forces(step: int) -> np.ndarray:
+        sound = reading(step).foot_forces
+        return np.where(np.arange(4) == 3, value, sound) if step > 50 else sound
+
+    last, faults = watched(*(reading(k, foot_forces=forces(k)) for k in range(250)))
+    assert [fault.part for fault in faults] == ["RR_foot"]
+    assert last.foot_forces[3] == pytest.approx(0.25 * MODEL.mass * MODEL.gravity, abs=0.1)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_gyro_that_jumps_is_named_and_its_error_taken_off(axis: int) -> None:
+    off = 0.5 * np.eye(3)[axis]
+    steps = range(400)
+    last, faults = watched(*(reading(k, gyro=np.zeros(3) if k < 100 else off) for k in steps))
+    assert [fault.part for fault in faults] == ["gyro"]
+    assert faults[0].since < 0.2 + 0.3
+    assert last.gyro == pytest.approx(np.zeros(3), abs=0.09)
+
+
+def test_a_robot_that_turns_has_a_sound_gyro() -> None:
+    """Its feet turn about it as the gyro says."""
+    w = np.array([0.0, 0.0, 0.6])
+    legs, turning = leg_table(MODEL).geometry, []
+    for k in range(300):
+        v = np.zeros(12)
+        for leg in range(4):
+            q = tuple(STANDING[3 * leg : 3 * leg + 3])
+            place = np.array(plain(leg_motion)(legs[leg], q, (0.0,) * 3, (0.0,) * 3)[0])
+            J = np.array(
+                [plain(leg_motion)(legs[leg], q, tuple(e), (0.0,) * 3)[1] for e in np.eye(3)]
+            ).T
+            v[3 * leg : 3 * leg + 3] = np.linalg.solve(J, -np.cross(w, place))
+        turning.append(reading(k, gyro=w, v_joints=v))
+    _, faults = watched(*turning)
+    assert faults == ()
