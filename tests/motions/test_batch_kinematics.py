@@ -16,7 +16,6 @@ from motions.batch_kinematics import (
 )
 from motions.plan.balance import nearest
 from motions.postures import standing_feet
-from tests.engine_helpers import angular_velocity_from_rpy
 
 COUNT = 300
 LEFT = 0.2  # share of the error that a step leaves at most; an eighth is usual
