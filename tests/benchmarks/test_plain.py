@@ -15,7 +15,7 @@ def test_a_few_ticks_of_a_trot_are_what_their_python_makes() -> None:
         go2.wait(0.1)
         with every_call_compared() as tallies:
             go2.wait(0.1)
-    assert tallies["plan"].calls == tallies["solve_condensed"].calls == 50
+    assert tallies["plan"].calls == tallies["solve_tick"].calls == 50
     assert all(tally.worst <= NEAR for tally in tallies.values())
 
 
