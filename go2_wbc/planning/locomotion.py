@@ -251,9 +251,7 @@ class LocomotionPlanner:
             trunk=Trunk(yaw=snapshot.state.yaw, position=snapshot.p_world_com[:2]),
             rest=Rest(place=snapshot.p_world_com[:2], middle=snapshot.p_world_feet.mean(axis=0)),
             ground=ground_below(snapshot, self._model.foot_radius),
-            slip=Slip(
-                friction=min(self._config.ground_friction if friction is None else friction, MOST)
-            ),
+            slip=Slip(friction=min(known, MOST)),
             feet=feet,
             planned=PlannedForces(next=-np.inf),
         )
