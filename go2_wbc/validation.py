@@ -31,25 +31,25 @@ _NUMBERS = re.compile(r"(float|int)$|(Annotated\[)?tuple\[(float|int)\b")
 
 
 @dataclass(frozen=True, slots=True)
-class Range:
+class Rule:
     """What a number must be, beside finite: in words, and as a rule."""
 
     what: str
     holds: Callable[[float], bool]
 
 
-POSITIVE = Range("positive", lambda value: value > 0.0)
-NOT_NEGATIVE = Range("at least 0", lambda value: value >= 0.0)
-FINITE = Range("finite", lambda _: True)
-SHARE = Range("above 0 and at most 1", lambda value: 0.0 < value <= 1.0)
+POSITIVE = Rule("positive", lambda value: value > 0.0)
+NOT_NEGATIVE = Rule("at least 0", lambda value: value >= 0.0)
+FINITE = Rule("finite", lambda _: True)
+SHARE = Rule("above 0 and at most 1", lambda value: 0.0 < value <= 1.0)
 
 
-def between(low: float, high: float) -> Range:
+def between(low: float, high: float) -> Rule:
     """Numbers in [``low``, ``high``]."""
-    return Range(f"between {low:g} and {high:g}", lambda value: low <= value <= high)
+    return Rule(f"between {low:g} and {high:g}", lambda value: low <= value <= high)
 
 
-def ranged(rest: Range | None = None, /, **ranges: Range) -> Callable[[_Class], _Class]:
+def ranged(rest: Rule | None = None, /, **ranges: Rule) -> Callable[[_Class], _Class]:
     """Let a dataclass refuse numbers out of range; stands below ``@dataclass``.
 
     Its ``__post_init__``, if it has one, is called with numbers that are in range.
@@ -131,7 +131,7 @@ def retires(**names: object) -> Callable[[_Class], _Class]:
     return decorate
 
 
-def require(config: object, rule: Range, *names: str) -> None:
+def require(config: object, rule: Rule, *names: str) -> None:
     """Raise ConfigError unless each named field of ``config`` keeps to ``rule``."""
     for name in names:
         field = getattr(config, name)

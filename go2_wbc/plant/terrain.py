@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Range, ranged
+from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Rule, ranged
 
 STEEPEST = 0.8
 """Greatest angle [rad] of a slope: steeper than any friction coefficient up to 1 holds."""
 HALF_WIDTH = 5.0
 """Half width [m] of stairs, ramps and patches."""
-CLIMBED = Range(f"above 0, at most {STEEPEST} rad", lambda angle: 0.0 < angle <= STEEPEST)
+CLIMBED = Rule(f"above 0, at most {STEEPEST} rad", lambda angle: 0.0 < angle <= STEEPEST)
 PLATFORM = 10.0
 """Length [m] of the level ground behind the last step."""
 

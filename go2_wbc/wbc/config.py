@@ -9,7 +9,7 @@ import numpy as np
 from go2_wbc.records import Array3
 from go2_wbc.reference import LEAST_WEIGHT, MOST_WEIGHT
 from go2_wbc.robot.joint_friction import JointFriction
-from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, Range, between, ranged
+from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, Rule, between, ranged
 
 WEIGHTS = (1e-3, 1e3)
 """Least and greatest weight of a task. At all 16 corners of these ranges four solvers agree within
@@ -18,7 +18,7 @@ FORCE_WEIGHTS = (LEAST_WEIGHT, MOST_WEIGHT)
 """Least and greatest weight of the force regularisation, measured along."""
 
 WEIGHT = between(*WEIGHTS)
-WEIGHT_OR_NONE = Range(WEIGHT.what, lambda value: value == 0.0 or WEIGHT.holds(value))
+WEIGHT_OR_NONE = Rule(WEIGHT.what, lambda value: value == 0.0 or WEIGHT.holds(value))
 GREATEST_GAIN = 1e6
 """(2 / dt)^2 [1/s^2] at 500 ticks a second: a loop with more than that swings itself up."""
 

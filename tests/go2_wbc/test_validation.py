@@ -14,8 +14,8 @@ from go2_wbc.validation import (
     NOT_NEGATIVE,
     POSITIVE,
     SHARE,
-    Range,
     Retired,
+    Rule,
     between,
     ranged,
     require,
@@ -48,14 +48,14 @@ class Planner:
 
 
 TINY = math.ulp(0.0)
-ALLOWED: list[tuple[Range, list[object]]] = [
+ALLOWED: list[tuple[Rule, list[object]]] = [
     (POSITIVE, [TINY, 1, 1e300]),
     (NOT_NEGATIVE, [0, 0.0, TINY, 7.0]),
     (FINITE, [-1e300, 0.0, 3, (1.0, -2.0)]),
     (SHARE, [TINY, 0.5, 1, 1.0]),
     (between(-1.0, 2.0), [-1.0, 0, 2.0]),
 ]
-REFUSED: list[tuple[Range, str, list[object]]] = [
+REFUSED: list[tuple[Rule, str, list[object]]] = [
     (POSITIVE, "positive", [0.0, -0.0, -TINY, (1.0, 0.0)]),
     (NOT_NEGATIVE, "at least 0", [-TINY, (-1.0, 1.0)]),
     (FINITE, "finite", []),
@@ -66,13 +66,13 @@ NO_NUMBERS: list[object] = [math.nan, math.inf, -math.inf, True, False, "1", Non
 
 
 @pytest.mark.parametrize(("rule", "values"), ALLOWED)
-def test_what_is_in_range_is_accepted(rule: Range, values: list[object]) -> None:
+def test_what_is_in_range_is_accepted(rule: Rule, values: list[object]) -> None:
     for value in values:
         require(Settings(value, value), rule, "value", "other")
 
 
 @pytest.mark.parametrize(("rule", "what", "values"), REFUSED)
-def test_what_is_not_is_refused_by_name(rule: Range, what: str, values: list[object]) -> None:
+def test_what_is_not_is_refused_by_name(rule: Rule, what: str, values: list[object]) -> None:
     for value in [*values, *NO_NUMBERS]:
         with pytest.raises(ConfigError) as caught:
             require(Settings(other=value), rule, "value", "other")
