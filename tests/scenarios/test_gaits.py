@@ -40,7 +40,7 @@ def test_a_gait_walks_at_the_edge_of_its_envelope_and_comes_to_rest(name: str) -
         go2.move(FAST)
         wanted = go2.command.linear_x
         assert wanted == pytest.approx(envelope_of(GAITS[name], VelocityEnvelope()).forward)
-        go2.wait(2.0)
+        go2.wait(3.0)  # a bound takes as long to find out that the ground holds
         truth.clear()
         go2.wait(2.0)
         speed = float(truth.recording().com_velocity[:, 0].mean())

@@ -121,7 +121,7 @@ def test_a_source_sees_saves_once_they_are_done(rise: Path) -> None:
 
 def test_a_motion_of_the_library_has_its_own_file_and_parameters() -> None:
     source = MotionSource("wave", ["times=3"])
-    assert source.path.name == "wave.py"
+    assert source.path.name == "paws.py"
     assert seconds(source) > seconds(MotionSource("wave", ["times=2"]))
     with pytest.raises(CommandError, match="unknown motion"):
         MotionSource("waves", [])
@@ -164,6 +164,6 @@ def test_a_browser_is_opened_where_there_is_a_screen(
     monkeypatch.setattr(motion_preview.time, "sleep", interrupt)
     first, verdict = run("preview", "bow", "--port", 0, *arguments).out.splitlines()
     assert first.startswith("bow: http://127.0.0.1:")
-    assert "bow.py; Ctrl-C ends)" in first
+    assert "trunk.py; Ctrl-C ends)" in first
     assert verdict.startswith("ok   bow ")
     assert opened == ([first.split()[1]] if opens else [])
