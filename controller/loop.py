@@ -11,6 +11,7 @@ A plant that fails, gives no new state, or gives one that is not finite, ends th
 from __future__ import annotations
 
 import logging
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -22,7 +23,7 @@ from controller.telemetry import Telemetry
 from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible
 from go2_wbc.plant.base import Plant
 from go2_wbc.reference import JointReference, Reference, Target, sag_and_lean
-from go2_wbc.robot.latency import Latency
+from go2_wbc.robot.latency import LAGS, Latency
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor_watch import MotorWatch
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
@@ -104,7 +105,7 @@ class ControlLoop:
         self._payloads = payloads
         self._motors = MotorWatch(model.motor)
         self.health = Health()
-        self._last_command = JointCommand.damping(DAMPING)
+        self._commands = deque([JointCommand.damping(DAMPING)], LAGS)
         self._unanswered = 0
         self._qp_failures_in_a_row, self._grave_since = 0, inf
         is_up = self.state.tilt < safety.tilt_limit  # one that is found on its back has not fallen
@@ -151,8 +152,9 @@ class ControlLoop:
                 as the plant still obeys, and the fault is noted; so for any other exception.
         """
         try:
-            if self._observe() and not self.plant.is_live:  # whose commands may come late
-                self._motors.update(self._last_command, self.state, self.plant.control_period)
+            if self._observe() and self.plant.motors_obey:
+                acted = self._commands[max(-1 - self.latency.ticks, -len(self._commands))]
+                self._motors.update(acted, self.state, self.plant.control_period)
             self._look_after_parts()
             self._guard()
             self._feel()
@@ -162,7 +164,7 @@ class ControlLoop:
             command = self._command(target)
             if not self._foretold:
                 self.latency.forget()
-            self._last_command = command
+            self._commands.append(command)
             self.plant.write(command)
             self._unanswered += 1
         except Exception as error:
@@ -283,7 +285,7 @@ class ControlLoop:
             what = str(error) if is_first else str(error).splitlines()[0]  # one table is enough
             time = self.state.time
             self.warn("QP failure at t=%.3f s, holding the last torque: %s", time, what)
-            return self._last_command
+            return self._commands[-1]
         return JointCommand.damping(DAMPING)
 
 

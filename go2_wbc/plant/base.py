@@ -37,6 +37,14 @@ class Plant(ABC):
         return None
 
     @property
+    def motors_obey(self) -> bool:
+        """Whether motors are asked for what is written, at once, so that they are judged by it.
+
+        Not where others may command them, or time passes between two ``write``.
+        """
+        return False
+
+    @property
     def sensor_faults(self) -> tuple[PartFault, ...]:
         """Sensors that were found to be broken; a plant that does not look says none."""
         return ()

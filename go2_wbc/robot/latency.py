@@ -126,9 +126,14 @@ class Latency:
         self._period, self._lag = period, Lag()
 
     @property
+    def ticks(self) -> int:
+        """Control periods after which a command acts, as far as it is known."""
+        return int(self._lag.ticks)
+
+    @property
     def delay(self) -> float:
         """Time [s] after which a command acts, as far as it is known."""
-        return float(self._lag.ticks) * self._period
+        return self.ticks * self._period
 
     def note(self, tau: Float[np.ndarray, "12"], qdd: Float[np.ndarray, "18"]) -> None:
         """The torques [N m] that have just been asked for, and what they are to make."""

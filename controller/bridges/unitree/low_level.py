@@ -128,11 +128,17 @@ def sensor_reading(message: Shaped[np.ndarray, "1"]) -> SensorReading:
     )
 
 
-def with_own_attitude(state: RobotState, message: Shaped[np.ndarray, "1"]) -> RobotState:
-    """``state`` with the attitude that the robot itself estimates: a second opinion of its tilt."""
-    q = state.q.copy()
+def as_it_says(
+    state: RobotState, reading: SensorReading, message: Shaped[np.ndarray, "1"]
+) -> RobotState:
+    """``state`` with the attitude that the robot itself estimates, and joints as they are read.
+
+    A second opinion for those who guard it: what the estimator has put right counts as it came.
+    """
+    q, v = state.q.copy(), state.v.copy()
+    q[7:], v[3:6], v[6:] = reading.q_joints, reading.gyro, reading.v_joints
     q[3:7] = message["imu_state"][0]["quaternion"].astype(float)[[1, 2, 3, 0]]
-    return replace(state, q=q)
+    return replace(state, q=q, v=v)
 
 
 @final

@@ -18,10 +18,10 @@ from controller.behaviours.joints import DAMPING
 from controller.bridges.unitree import require_dds
 from controller.bridges.unitree.guards import GuardConfig, Guards, is_passive, require_sane
 from controller.bridges.unitree.low_level import (
+    as_it_says,
     intact_message,
     low_cmd_message,
     sensor_reading,
-    with_own_attitude,
 )
 from controller.bridges.unitree.messages import LOW_STATE, encode_message
 from controller.bridges.unitree.sport_api import SWITCHER_SERVICE, Code, SwitcherApi
@@ -312,8 +312,9 @@ class UnitreePlant(Plant):
                 raise self._stop(PlantError("the robot's clock went back: it has started anew"))
             if tick > self._tick:
                 self._tick, self._heard = tick, time.monotonic()
-                self._state = self._estimator.update(sensor_reading(message))
-                self._own_view = with_own_attitude(self._state, message)
+                reading = sensor_reading(message)
+                self._state = self._estimator.update(reading)
+                self._own_view = as_it_says(self._state, reading, message)
         return self._tick > known
 
     # --- taking over ----------------------------------------------------------------------

@@ -17,7 +17,7 @@ from go2_wbc.plant.mujoco.contacts import Contacts, foot_contacts, touches_itsel
 from go2_wbc.plant.mujoco.plant import MujocoPlant
 from go2_wbc.robot.description import BASE_LINK
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.state import JointCommand, RobotState
+from go2_wbc.robot.state import JointCommand, PartFault, RobotState
 
 FALLEN_TILT = math.radians(60.0)
 """Tilt of the trunk from which on the robot has fallen, whatever the controller thinks."""
@@ -139,6 +139,16 @@ class GroundTruth(Plant):
     def control_period(self) -> float:
         """Seconds that pass in one ``write``."""
         return self._plant.control_period
+
+    @property
+    def motors_obey(self) -> bool:
+        """As the plant's do."""
+        return self._plant.motors_obey
+
+    @property
+    def sensor_faults(self) -> tuple[PartFault, ...]:
+        """Those of the plant."""
+        return self._plant.sensor_faults
 
     @property
     def body_contact_force(self) -> float | None:

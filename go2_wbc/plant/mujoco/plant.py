@@ -305,6 +305,11 @@ class MujocoPlant(Plant):
         self._faults.known += (fault,)
 
     @property
+    def motors_obey(self) -> bool:
+        """True; see ``Plant.motors_obey``."""
+        return True
+
+    @property
     def sensor_faults(self) -> tuple[PartFault, ...]:
         """See ``Plant.sensor_faults``; who is told the true state looks once a part is broken."""
         watch = self._senses or self._faults.watch
