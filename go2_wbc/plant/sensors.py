@@ -188,7 +188,8 @@ class Proprioception:
     @property
     def faults(self) -> tuple[PartFault, ...]:
         """Sensors that were found to be broken."""
-        return self._estimator.watch.faults
+        watch = self._estimator.watch
+        return () if watch is None else watch.faults
 
     @property
     def covariance(self) -> OdometryCovariance:

@@ -253,11 +253,14 @@ class StateEstimator:
     """Turns sensor readings into ``RobotState``; the world's origin is where the base was first.
 
     Attributes:
-        watch: what puts readings right that contradict the others, and names the broken part.
+        watch: what puts readings right that contradict the others, and names the broken part;
+            None if nobody watches.
     """
 
-    def __init__(self, model: RobotModel, config: EstimatorConfig | None = None) -> None:
-        """Estimate the state of ``model``'s robot."""
+    def __init__(
+        self, model: RobotModel, config: EstimatorConfig | None = None, *, watches: bool = True
+    ) -> None:
+        """Estimate the state of ``model``'s robot, and watch its sensors unless told not to."""
         self._config = config or EstimatorConfig()
         pin_model = model.pin_model
         imu = IMU_FRAME if pin_model.existFrame(IMU_FRAME) else BASE_LINK
@@ -272,13 +275,14 @@ class StateEstimator:
         self._reading, self._state = packed(reading), EstimatorState()
         self._x, self._P = self._state.filter.x, self._state.filter.P
         self._x.quaternion[3] = 1.0
-        self.watch = SensorWatch(model)
+        self.watch = SensorWatch(model) if watches else None
 
     def update(self, reading: SensorReading) -> RobotState:
         """Take in a reading that is newer than the last one; returns the state at its time."""
-        reading = self.watch.checked(reading, self._x.quaternion)
-        if (turn := self.watch.misturned) is not None:
-            self._turn_back(turn)
+        if self.watch is not None:
+            reading = self.watch.checked(reading, self._x.quaternion)
+            if (turn := self.watch.misturned) is not None:
+                self._turn_back(turn)
         step = reading.time - self._time
         if not 0.0 <= step <= self._config.longest_step:
             self._begin(reading)
