@@ -163,6 +163,8 @@ def test_boxes_are_on_the_floor_and_leave_the_start_clear() -> None:
     terrain = Boxes(height=0.05, size=0.3, count=80, seed=3)
     rows = terrain.layout()
     assert np.array_equal(rows, Boxes(height=0.05, size=0.3, count=80, seed=3).layout())
+    sides = np.abs(rows[:, :2].mean(axis=0)) < 0.2 * terrain.extent
+    assert sides.all(), "they lie on all sides of the start"
     assert 40 < len(rows) <= 80
     assert (rows[:, 3] <= 0.05).all()
     assert np.hypot(rows[:, 0], rows[:, 1]).min() > terrain.clear_radius
