@@ -441,7 +441,8 @@ class GO2Controller:
         except Go2WbcError as error:
             self._note(call, str(error))
             raise
-        self._note(call, "done", measured, ok=True)
+        told = "done" if self.health.is_sound else f"done; {self.health}"
+        self._note(call, told, measured, ok=True)
         return True
 
     def _note(

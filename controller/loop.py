@@ -194,7 +194,7 @@ class ControlLoop:
         """Say what has broken; a robot that cannot stand without it goes limp before it falls."""
         faults = (*self.plant.sensor_faults, *self._motors.faults)
         if len(faults) != len(self.health.faults):
-            for fault in set(faults) - set(self.health.faults):
+            for fault in (fault for fault in faults if fault not in self.health.faults):
                 self.warn("%s", fault)
             self.health = Health(faults)
         if faults and self.fault is None and self.behaviour.needs_balance:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from jaxtyping import Float
@@ -174,6 +174,19 @@ class Faults:
             foot_forces=forces,
         )
         return self._last
+
+    def save(self) -> Mapping[str, Any]:
+        """All that is broken, and known of it."""
+        watch = None if self.watch is None else self.watch.save()
+        return {"known": self.known, "last": self._last, "watch": watch}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go back to what ``save`` returned."""
+        self.known, self._last = saved["known"], saved["last"]
+        if self.watch is not None:
+            self.watch.restart()
+            if saved["watch"] is not None:
+                self.watch.restore(saved["watch"])
 
     def seen(self, state: RobotState, imu: ImuSample, threshold: float) -> RobotState:
         """``state`` with the joints, forces and rates of broken sensors, put right by the watch.

@@ -336,12 +336,18 @@ class StateEstimator:
     def save(self) -> Mapping[str, Any]:
         """All that the next estimates depend on, besides the readings."""
         return MappingProxyType(
-            {"time": self._time, "state": EstimatorState.of(self._state.row.copy())}
+            {
+                "time": self._time,
+                "state": EstimatorState.of(self._state.row.copy()),
+                "watch": None if self.watch is None else self.watch.save(),
+            }
         )
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go back to what ``save`` returned."""
         self._time = saved["time"]
+        if self.watch is not None and saved["watch"] is not None:
+            self.watch.restore(saved["watch"])
         self._state.row[:] = saved["state"].row
 
     def _forget(self, reading: SensorReading, keeps_height: bool) -> None:

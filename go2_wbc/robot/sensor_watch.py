@@ -17,15 +17,17 @@ number is taken for the one before. A healthy robot's readings leave as they cam
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
 from go2_wbc.algebra.vectors import cross, plus_scaled, put, triple
-from go2_wbc.compilation import kernel, subroutine
+from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.records import V3, Array3, Array3x3, Array4, Array12, Record, numbers_of, packed
 from go2_wbc.robot.leg_kinematics import LegGeometry, Legs, leg_table
@@ -65,6 +67,9 @@ CALM = 0.05
 """Time [s] after which one that has come to its feet is judged by them."""
 STANDING = np.tile([0.0, 0.8, -1.6], 4)
 """Joint angles [rad] of a robot that stands, roughly."""
+UNSEEN = 0.5
+"""m^2 that is added to what feet tell of each axis of the gyro's error, and draws it towards 0: two
+feet tell nothing of a turn about the line between them. A pair adds 0.1 to 0.25 in each tick."""
 FINER = 1.0 / 3.0
 """Share of the gyro's limit above which what is left of its error is taken off, too."""
 
@@ -277,9 +282,9 @@ def note_turn(s: WatchedSensors, between: V3, apart: V3, w: V3) -> None:
 def gyro_error(s: WatchedSensors) -> V3:
     """The least squares' answer, drawn towards 0 where the feet tell nothing."""
     A, b = s.turning, s.turned
-    c0 = (A[0, 0] + 0.5, A[1, 0], A[2, 0])
-    c1 = (A[0, 1], A[1, 1] + 0.5, A[2, 1])
-    c2 = (A[0, 2], A[1, 2], A[2, 2] + 0.5)
+    c0 = (A[0, 0] + UNSEEN, A[1, 0], A[2, 0])
+    c1 = (A[0, 1], A[1, 1] + UNSEEN, A[2, 1])
+    c2 = (A[0, 2], A[1, 2], A[2, 2] + UNSEEN)
     r0, r1, r2 = cross(c1, c2), cross(c2, c0), cross(c0, c1)
     det = c0[0] * r0[0] + c0[1] * r0[1] + c0[2] * r0[2]
     return (
@@ -363,15 +368,24 @@ def judge_gyro(s: WatchedSensors, dt: float) -> None:
 @kernel
 def watch_sensors(
     s: WatchedSensors,
-    r: SensorReading,
+    gyro: Foreign[Array3],
+    accelerometer: Foreign[Array3],
+    q_joints: Foreign[Array12],
+    v_joints: Foreign[Array12],
+    tau: Foreign[Array12],
+    foot_forces: Foreign[Array4],
+    quaternion: Foreign[Array4],
     c: WatchNumbers,
-    quaternion: Array4,
     dt: float,
-) -> None:
-    """Judge a reading, ``dt`` seconds after the last one, and put it right.
+    r: SensorReading,
+) -> int:
+    """Judge a reading, ``dt`` seconds after the last one, and fill ``r`` with what it should be.
 
-    ``quaternion`` (x y z w): the orientation of the base, as last known.
+    The first six are as in ``SensorReading``; ``quaternion`` (x y z w) is the orientation of the
+    base, as last known. Returns how many parts are broken.
     """
+    r.gyro[:], r.accelerometer[:], r.tau[:] = gyro, accelerometer, tau
+    r.q_joints[:], r.v_joints[:], r.foot_forces[:] = q_joints, v_joints, foot_forces
     x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     up = (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
     if s.has_begun > 0.0:
@@ -379,8 +393,16 @@ def watch_sensors(
         watch_encoders(s, r, dt)
     else:
         s.has_begun = 1.0
-        s.q[:], s.v[:] = r.q_joints, r.v_joints
+        for j in range(12):
+            s.q[j], s.v[j] = r.q_joints[j], r.v_joints[j]
+            r.q_joints[j] -= s.shift[j]
     watch_legs(s, r, c, up, dt)
+    broken = s.gyro_is_off
+    for j in range(12):
+        broken += s.stuck[j] + s.jumped[j]
+    for leg in range(4):
+        broken += s.force_is_wrong[leg]
+    return int(broken)
 
 
 class SensorWatch:
@@ -412,24 +434,34 @@ class SensorWatch:
 
     def checked(self, reading: SensorReading, quaternion: Array4) -> SensorReading:
         """``reading`` as it should be, on a base that was last turned so (x y z w)."""
-        s, r, dt = self._state, self._reading, reading.time - self._time
+        dt = reading.time - self._time
         if not 0.0 < dt < LONGEST_STEP:
-            s.has_begun, dt = 0.0, USUAL_STEP
+            self._state.has_begun, dt = 0.0, USUAL_STEP
         self._time = reading.time
-        r.gyro[:], r.accelerometer[:] = reading.gyro, reading.accelerometer
-        r.q_joints[:], r.v_joints[:], r.tau[:] = reading.q_joints, reading.v_joints, reading.tau
-        r.foot_forces[:] = reading.foot_forces
-        watch_sensors(s, r, self._numbers, quaternion, dt)
-        flags = s.row[_FLAGS]
-        if flags.any() and (flags > self._flags).any():
-            self._name(flags, reading.time)
-        row = numbers_of(r).copy()
+        imu, joints = (reading.gyro, reading.accelerometer), (reading.q_joints, reading.v_joints)
+        told = (*imu, *joints, reading.tau, reading.foot_forces, quaternion)
+        if watch_sensors(self._state, *told, self._numbers, dt, self._reading):
+            self._name(reading.time)
+        row = numbers_of(self._reading).copy()
         return SensorReading(reading.time, *(row[part] for part in _OF_READING))
 
-    def _name(self, flags: Float[np.ndarray, "29"], time: float) -> None:
+    def _name(self, time: float) -> None:
+        """Note what is newly broken."""
+        flags = self._state.row[_FLAGS]
         new = np.flatnonzero(flags > self._flags)
-        self._flags = np.maximum(flags, self._flags)
-        self.faults += tuple(PartFault(*_PARTS[k], since=time) for k in new)
+        if len(new):
+            self._flags = np.maximum(flags, self._flags)
+            self.faults += tuple(PartFault(*_PARTS[k], since=time) for k in new)
+
+    def save(self) -> Mapping[str, Any]:
+        """All that the next readings are judged by."""
+        row = self._state.row.copy()
+        return {"row": row, "time": self._time, "flags": self._flags, "faults": self.faults}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go back to what ``save`` returned."""
+        self._state.row[:] = saved["row"]
+        self._time, self._flags, self.faults = saved["time"], saved["flags"], saved["faults"]
 
 
 _OF_READING = tuple(slice(first, last) for first, last in pairwise((1, 4, 7, 19, 31, 43, 47)))

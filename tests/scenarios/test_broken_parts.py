@@ -44,6 +44,8 @@ def test_a_robot_goes_on_without_a_part(kind: str, part: str, value: float | Non
         (fault,) = go2.health.faults
         assert part in fault.part or kind == fault.part
         assert fault.since < broken + NAMED_WITHIN
+        assert go2.stand() or kind == "motor"
+        assert str(fault) in go2.last_outcome.reason or kind == "motor"
         assert str(fault) in str(go2.health)
 
 

@@ -51,6 +51,7 @@ class SavedPhysics(NamedTuple):
     state: RobotState | None
     imu: ImuSample | None
     senses: Mapping[str, Any] | None
+    faults: Mapping[str, Any]
 
 
 class MujocoPlant(Plant):
@@ -340,6 +341,8 @@ class MujocoPlant(Plant):
         self._forces = np.zeros(ROBOT_BINS)
         if self._senses is not None:
             self._senses.restart()
+        if self._faults.watch is not None:
+            self._faults.watch.restart()
         self._sense()
 
     @property
@@ -389,6 +392,7 @@ class MujocoPlant(Plant):
             state=self._state,
             imu=self._imu,
             senses=None if self._senses is None else self._senses.save(),
+            faults=self._faults.save(),
         )
 
     def restore(self, saved: SavedPhysics) -> None:
@@ -406,6 +410,7 @@ class MujocoPlant(Plant):
         self._truth, self._state, self._imu = None, saved.state, saved.imu
         if self._senses is not None and saved.senses is not None:
             self._senses.restore(saved.senses)
+        self._faults.restore(saved.faults)
 
     def close(self) -> None:
         """Ends the plant; every later call but ``close`` raises ``ClosedError``."""

@@ -76,6 +76,25 @@ def test_a_share_of_the_states_does_not_arrive() -> None:
     assert np.mean(np.diff(times) == 0.0) == pytest.approx(0.2, abs=0.06)
 
 
+@pytest.mark.parametrize("sensors", ["ideal", "imu"])
+def test_a_robot_that_is_put_back_to_before_a_fault_is_sound(sensors: str) -> None:
+    plant = MujocoPlant(sensors=sensors)
+    stand_up(plant)
+    saved, states = plant.save(), []
+    for breaks in (False, True, False):
+        plant.restore(saved)
+        if breaks:
+            plant.fault("encoder", part="FL_calf_joint")
+            plant.fault("motor", part="FR_calf_joint")
+        for _ in range(50):
+            plant.write(HOLD)
+            state = plant.read()
+        states.append(state)
+        assert bool(plant.sensor_faults) is breaks
+    assert np.array_equal(states[0].q, states[2].q)
+    assert not np.array_equal(states[0].q, states[1].q)
+
+
 def test_what_cannot_break_is_refused_with_what_can() -> None:
     plant = MujocoPlant()
     with pytest.raises(CommandError, match="unknown kind of fault 'wheel'; valid: "):

@@ -116,6 +116,14 @@ def test_a_jump_of_an_encoder_is_named_and_taken_off() -> None:
     assert last.q_joints == pytest.approx(STANDING, abs=1e-6)
 
 
+def test_a_jump_is_taken_off_after_a_gap_too() -> None:
+    off = STANDING.copy()
+    off[4] += 0.1
+    late = replace(reading(60, q_joints=off), time=5.0)
+    last, _ = watched(*(reading(k, q_joints=STANDING if k < 50 else off) for k in range(60)), late)
+    assert last.q_joints == pytest.approx(STANDING, abs=1e-6)
+
+
 def test_an_encoder_that_stays_while_its_leg_turns_is_stuck() -> None:
     moving = [
         reading(k, q_joints=STANDING + 1e-3 * k * (np.arange(12) != 2), v_joints=np.full(12, 0.5))
