@@ -88,8 +88,8 @@ def test_a_robot_that_is_put_back_to_before_a_fault_is_sound(sensors: str) -> No
             plant.fault("motor", part="FR_calf_joint")
         for _ in range(50):
             plant.write(HOLD)
-            state = plant.read()
-        states.append(state)
+            plant.read()
+        states.append(plant.read())
         assert bool(plant.sensor_faults) is breaks
     assert np.array_equal(states[0].q, states[2].q)
     assert not np.array_equal(states[0].q, states[1].q)
