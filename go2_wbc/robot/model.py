@@ -16,7 +16,7 @@ import pinocchio as pin
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS
 from go2_wbc.records import Array3, Array4x3, Array12, Array18, Array19, layout_of
-from go2_wbc.robot.description import RobotDescription, find_description
+from go2_wbc.robot.description import BASE_LINK, RobotDescription, find_description
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.rigid_body import RigidBodies, fill_snapshot
@@ -28,6 +28,7 @@ FOOT_RADIUS = 0.022
 """Radius [m] of the spherical foot, of the URDF's foot mesh and of every published MJCF."""
 ROTOR_ARMATURE = np.tile([0.0045, 0.0045, 0.0164], 4)
 """Reflected rotor inertia [kg m^2] per joint; same provenance as the plant's ``JointDynamics``."""
+IMU_FRAME = "imu"
 LEG_AXES = ("JointModelRX", "JointModelRY", "JointModelRY")
 """What Pinocchio calls the joints of a leg: they turn about x, y and y."""
 FINGERPRINT_DECIMALS = 9
@@ -52,6 +53,7 @@ class RobotModel:
         torque_limits: (12,) [N m], the motors' peak.
         speed_limits: (12,) [rad/s].
         q_lower, q_upper: (12,) joint limits [rad], the tighter of URDF and published ones.
+        p_base_imu: (3,) place of the IMU in the base frame [m].
         p_base_hips: (4, 3) hip abduction axes' origins in the base frame [m].
         hip_width: lateral distance [m] from the abduction axis to the leg plane.
         p_base_feet_nominal: (4, 3) points of the leg planes beside the hips in the base frame [m];
@@ -103,6 +105,8 @@ class RobotModel:
         self.q_upper = np.array(model.upperPositionLimit[7:])
         self.q_lower[0::3] = np.maximum(self.q_lower[0::3], -HIP_LIMIT)
         self.q_upper[0::3] = np.minimum(self.q_upper[0::3], HIP_LIMIT)
+        imu = model.getFrameId(IMU_FRAME if model.existFrame(IMU_FRAME) else BASE_LINK)
+        self.p_base_imu = np.array(model.frames[imu].placement.translation)
         hips = [model.jointPlacements[model.getJointId(JOINT_NAMES[3 * leg])] for leg in LEGS]
         self.p_base_hips = np.array([T.translation for T in hips])
         thigh = model.jointPlacements[model.getJointId(JOINT_NAMES[1])]
