@@ -13,9 +13,9 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from go2_wbc.robot.state import RobotState
-from motions.postures import STAND_HEIGHT
 
 FRICTION_RANGE, MASS_RANGE, UNTOLD = (0.6, 1.0), (0.95, 1.05), (0.9, 1.1)
 """Friction, and factor on every mass and inertia of the robot, twice; the controller is not told.
@@ -81,8 +81,8 @@ def standing_failure(robot: TrialRobot) -> str | None:
     Standing is: CoM within 20 mm of its height, tilt below 6 deg, every foot loaded.
     """
     state, height = robot.plant.truth(), float(robot.truth.p_world_com[2])
-    if abs(height - STAND_HEIGHT) > HEIGHT_TOLERANCE:
-        return f"CoM at {height:.3f} m instead of {STAND_HEIGHT:.2f} m"
+    if abs(height - find_profile().stand_height) > HEIGHT_TOLERANCE:
+        return f"CoM at {height:.3f} m instead of {find_profile().stand_height:.2f} m"
     if state.tilt > TILT_TOLERANCE:
         return f"tilt {math.degrees(state.tilt):.1f} deg"
     least = float(state.foot_forces.min())

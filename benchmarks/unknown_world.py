@@ -37,7 +37,7 @@ from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.plant.mujoco.model import JointDynamics
 from go2_wbc.plant.terrain import Boxes, Patch, Ramp, Slope, Stairs, Terrain
 from go2_wbc.robot.joint_friction import JointFriction
-from motions.postures import STAND_HEIGHT
+from go2_wbc.robot.profile import find_profile
 
 FIRST_SEED = 14200
 """Seed of the first trial that is judged; those from 4200 on were, and causes found on them."""
@@ -148,7 +148,7 @@ def _note_posture(recorded: TruthRecording, found: TrialResult) -> None:
     The height is that of the CoM as the model has it, without the payload: what is asked for.
     """
     window = recorded.since(recorded.time[-1] - REST)
-    found.worsen("height", 1000.0 * abs(com_height(window) - STAND_HEIGHT))
+    found.worsen("height", 1000.0 * abs(com_height(window) - find_profile().stand_height))
     found.worsen("tilt", math.degrees(float(np.abs(window.rpy[:, :2].mean(axis=0)).max())))
 
 
@@ -232,7 +232,9 @@ def measure_robot(
             for call in CALLS:
                 if call in SPEEDS:
                     recorded, _ = _trotted(tried, SPEEDS[call], ROBOT_RAMP_UP, ROBOT_TROT)
-                    found.worsen("height", 1000.0 * abs(com_height(recorded) - STAND_HEIGHT))
+                    found.worsen(
+                        "height", 1000.0 * abs(com_height(recorded) - find_profile().stand_height)
+                    )
                 elif call == "stop":
                     tried.go2.stop()
                     tried.require(tried.go2.last_outcome.ok)

@@ -15,7 +15,7 @@ from go2_wbc.compilation import load_kernels
 from go2_wbc.config import Config
 from go2_wbc.lazy import without_collecting
 from go2_wbc.plant.base import Plant
-from go2_wbc.robot.description import RobotDescription
+from go2_wbc.robot.description import RobotDescription, find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload_estimation import PayloadEstimator
 from go2_wbc.wbc.controller import WholeBodyController
@@ -50,7 +50,7 @@ def build_pilot(
         realtime: let time pass in a background thread at wall-clock pace.
         viewer: open MuJoCo's window, if there is a display.
         recorded_time: robot time [s] that the telemetry keeps; 0 keeps the last tick.
-        description: what the controller takes the robot for; by default the installed Go2.
+        description: what the controller takes the robot for; by default the installed one.
         after_tick: is called after every tick, in the thread that ticks.
         extra_tasks: a user's own tasks of the whole-body QP.
 
@@ -64,7 +64,7 @@ def build_pilot(
         config = config.beside_hardware
     with without_collecting():
         load_kernels()
-    model = RobotModel(description, motor=config.motor)
+    model = RobotModel(description or find_description(robot=config.robot), motor=config.motor)
     wbc, dynamic_wbc = (
         WholeBodyController(model, config.backend, numbers, extra_tasks=extra_tasks)
         for numbers in (config.wbc, config.wbc.for_dynamics)

@@ -92,7 +92,7 @@ class ControlLoop:
         self.plant, self.model, self.wbc, self.telemetry = plant, model, wbc, telemetry
         self._dynamic_wbc = dynamic_wbc or wbc
         self._safety = safety
-        self._falls = FallDetector(safety)
+        self._falls = FallDetector(safety, model.profile)
         self._sag = self._lean = 0.0
         self.fault: Fault | None = None
         self.warn: Callable[..., None] = _log.warning

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
+from go2_wbc.robot.profile import GO2
 from go2_wbc.robot.state import JointCommand, PartFault, RobotState
 
 
 class Plant(ABC):
-    """A Go2 that can be read and commanded; its clock is the only clock of the controller.
+    """A robot that can be read and commanded; its clock is the only clock of the controller.
 
     One control tick is ``read()``, then ``write(command)``, which lets one control period pass.
     """
@@ -17,6 +18,11 @@ class Plant(ABC):
     @abstractmethod
     def control_period(self) -> float:
         """Seconds that pass in one ``write``."""
+
+    @property
+    def robot(self) -> str:
+        """Name of the profile of the robot that it is."""
+        return GO2
 
     @property
     def is_live(self) -> bool:

@@ -151,6 +151,11 @@ class GroundTruth(Plant):
         return self._plant.sensor_faults
 
     @property
+    def robot(self) -> str:
+        """That of the plant."""
+        return self._plant.robot
+
+    @property
     def body_contact_force(self) -> float | None:
         """See ``Plant.body_contact_force``."""
         return self._plant.body_contact_force

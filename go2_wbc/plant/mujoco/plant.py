@@ -28,7 +28,9 @@ from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors,
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.records import packed
 from go2_wbc.robot.estimator_config import EstimatorConfig
+from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel, drive
+from go2_wbc.robot.profile import GO2
 from go2_wbc.robot.state import JointCommand, OdometryCovariance, PartFault, RobotState
 from go2_wbc.world import SENSORS
 
@@ -55,14 +57,14 @@ class SavedPhysics(NamedTuple):
 
 
 class MujocoPlant(Plant):
-    """A Go2 in MuJoCo, driven by torques only; lies on the ground, folded and damped, at time 0.
+    """A robot in MuJoCo, driven by torques only; lies on the ground, folded and damped, at time 0.
 
     The motor law is evaluated at every physics step, and cut to what the motors give at the joints'
     speeds then. Contact forces and torques that ``read`` reports acted over the last physics step
     and the last control period, respectively; positions and velocities are those of this instant.
 
     Args:
-        mjcf: a user's own Go2 MJCF or scene; ``None`` builds the model from the URDF.
+        mjcf: a user's own MJCF or scene of it; ``None`` builds the model from the URDF.
         timestep: physics step [s]; overrides the one of ``mjcf``.
         control_period: seconds per ``write``, an integer multiple of ``timestep``.
         friction: sliding friction coefficient; ``None`` is 0.8, or what ``mjcf`` says. With
@@ -80,10 +82,11 @@ class MujocoPlant(Plant):
         seed: of both and of ``initial_joint_noise``.
         initial_yaw: heading at the start [rad].
         initial_joint_noise: standard deviation [rad] of the joint angles from which it settles.
-        joint_dynamics: friction, damping, armature; ``None`` is ``JointDynamics()``, or what
+        joint_dynamics: friction, damping, armature; ``None`` is the profile's, or what
             ``mjcf`` says.
         motor: ``"torque-speed"``, or ``"ideal"`` for the peak torque at every speed.
         urdf: another URDF instead of the installed one.
+        robot: name of its profile: "go2", "a1" or "go1".
         visuals: also load the visual meshes (slower), for the viewer and for rendering.
         delay: time [s] after which a command acts, rounded to whole control periods.
 
@@ -114,6 +117,7 @@ class MujocoPlant(Plant):
         joint_dynamics: JointDynamics | None = None,
         motor: str = TORQUE_SPEED,
         urdf: Path | str | None = None,
+        robot: str = GO2,
         visuals: bool = False,
         delay: float = 0.0,
     ) -> None:
@@ -122,6 +126,7 @@ class MujocoPlant(Plant):
         setup = PlantSetup(
             mjcf=mjcf,
             urdf=urdf,
+            robot=robot,
             timestep=timestep,
             control_period=control_period,
             friction=friction,
@@ -140,7 +145,7 @@ class MujocoPlant(Plant):
         start_rng, self._rng = np.random.default_rng(seed).spawn(2)
         # MuJoCo's warnings would otherwise go to a file in the working directory.
         mujoco.set_mju_user_warning(partial(_logger.warning, "MuJoCo: %s"))
-        self._model, self._layout, self._motor = prepare(setup)
+        self._model, self._layout, self._motor, self._description = prepare(setup)
         self._data = mujoco.MjData(self._model)
         self._noise = (noise or SensorNoise()) if sensors == "noisy" else None
         self._period, self._substeps = control_period, round(control_period / timestep)
@@ -148,7 +153,7 @@ class MujocoPlant(Plant):
         self._ticks = 0
         self._late, self._acting = round(delay / control_period), np.zeros((5, 12))
         self._waiting: deque[Float[np.ndarray, "5 12"]] = deque()  # commands that do not act yet
-        self._faults = Faults()
+        self._faults = Faults(self._description)
         self._pushes = Pushes(self._model, self._data, self._layout)
         # Views into MuJoCo's memory, made once because making them is slow.
         data, layout = self._data, self._layout
@@ -165,8 +170,14 @@ class MujocoPlant(Plant):
         self._ticks, self._data.time = 0, 0.0
         if sensors == "imu":
             errors = errors or SensorErrors()
-            self._senses = Proprioception(errors, control_period, self._rng, estimator)
+            own = RobotModel(self._description)
+            self._senses = Proprioception(errors, own, control_period, self._rng, estimator)
             self._sense()
+
+    @property
+    def robot(self) -> str:
+        """See ``Plant.robot``."""
+        return self._description.profile.name
 
     @property
     def control_period(self) -> float:

@@ -14,7 +14,7 @@ from go2_wbc.plant.mujoco.layout import MujocoLayout, find_layout, foot_geoms
 from go2_wbc.plant.mujoco.model import JointDynamics, add_payload, build_spec, finish
 from go2_wbc.plant.mujoco.user_model import load_user_model
 from go2_wbc.plant.terrain import Terrain
-from go2_wbc.robot.description import BASE_LINK, find_description
+from go2_wbc.robot.description import BASE_LINK, RobotDescription, find_description
 from go2_wbc.robot.motor import MotorModel, require_motor
 from go2_wbc.validation import FINITE, NOT_NEGATIVE, POSITIVE, ranged
 
@@ -37,6 +37,7 @@ class PlantSetup:
 
     mjcf: Path | str | None
     urdf: Path | str | None
+    robot: str
     timestep: float
     control_period: float
     friction: float | None
@@ -72,20 +73,20 @@ class PlantSetup:
             raise ConfigError("terrain is only for the built model; put it into the mjcf instead")
 
 
-def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout, MotorModel]:
-    """The compiled model, its index tables and its motors.
+def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout, MotorModel, RobotDescription]:
+    """The compiled model, its index tables, its motors, and what it was taken for.
 
     Raises:
         ModelMismatch: if the user's MJCF cannot be used.
         DescriptionError: if the robot's files are missing or broken.
     """
-    description = find_description(setup.urdf)
+    description = find_description(setup.urdf, setup.robot)
     if setup.mjcf is None:
         source, mistake = description.urdf_path, DescriptionError
         base = BASE_LINK
         spec = build_spec(
             description,
-            setup.joint_dynamics or JointDynamics(),
+            setup.joint_dynamics or JointDynamics.of(description.profile),
             friction=DEFAULT_FRICTION if setup.friction is None else setup.friction,
             terrain=setup.terrain,
             visuals=setup.visuals,
@@ -105,4 +106,4 @@ def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout, MotorModel
         model.geom_priority[feet] = model.geom_priority.max() + 1
     layout = find_layout(spec, model, description.efforts)
     motor = MotorModel.named(setup.motor, description).with_peak(layout.torque_limits)
-    return model, layout, motor
+    return model, layout, motor, description

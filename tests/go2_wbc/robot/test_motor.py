@@ -11,8 +11,11 @@ import pytest
 from go2_wbc.errors import ConfigError
 from go2_wbc.records import packed
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.motor import KNEE_SHARE, LEAST_SHARE, MOTORS, MotorModel, drive, note_peaks
+from go2_wbc.robot.motor import LEAST_SHARE, MOTORS, MotorModel, drive, note_peaks
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import JointCommand
+
+KNEE_SHARE = find_profile().knee_share
 
 MODEL = RobotModel()
 LINE = MODEL.motor
