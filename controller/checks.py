@@ -34,7 +34,7 @@ def unfolded_legs(snapshot: Snapshot) -> list[Leg]:
 
 def ground_height(snapshot: Snapshot) -> float:
     """Height [m] of the ground below the lowest foot."""
-    return float(snapshot.p_world_feet[:, 2].min()) - snapshot.foot_radius
+    return float(snapshot.p_world_feet[:, 2].min() - snapshot.foot_radius)
 
 
 def base_height(snapshot: Snapshot) -> float:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
+import numpy as np
+
+from go2_wbc.records import Array12
 from go2_wbc.robot.profile import GO2
 from go2_wbc.robot.state import JointCommand, PartFault, RobotState
 
@@ -23,6 +26,11 @@ class Plant(ABC):
     def robot(self) -> str:
         """Name of the profile of the robot that it is."""
         return GO2
+
+    @property
+    def joint_damping(self) -> Array12:
+        """Viscous friction of the joints [N m s/rad], as far as it is written down; else 0."""
+        return np.zeros(12)
 
     @property
     def is_live(self) -> bool:

@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float, Int
 from go2_wbc.plant.base import Plant
 from go2_wbc.plant.mujoco.contacts import Contacts, foot_contacts, touches_itself
 from go2_wbc.plant.mujoco.plant import MujocoPlant
+from go2_wbc.records import Array12
 from go2_wbc.robot.description import BASE_LINK
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand, PartFault, RobotState
@@ -154,6 +155,11 @@ class GroundTruth(Plant):
     def robot(self) -> str:
         """That of the plant."""
         return self._plant.robot
+
+    @property
+    def joint_damping(self) -> Array12:
+        """That of the plant."""
+        return self._plant.joint_damping
 
     @property
     def body_contact_force(self) -> float | None:

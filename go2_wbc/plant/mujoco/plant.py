@@ -26,7 +26,7 @@ from go2_wbc.plant.mujoco.settling import LYING_DAMPING, settle
 from go2_wbc.plant.mujoco.setup import PlantSetup, prepare
 from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors, SensorNoise
 from go2_wbc.plant.terrain import Terrain
-from go2_wbc.records import packed
+from go2_wbc.records import Array12, packed
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel, drive
@@ -147,6 +147,8 @@ class MujocoPlant(Plant):
         mujoco.set_mju_user_warning(partial(_logger.warning, "MuJoCo: %s"))
         self._model, self._layout, self._motor, self._description = prepare(setup)
         self._data = mujoco.MjData(self._model)
+        is_written = mjcf is not None and joint_dynamics is None
+        self._damping = is_written * self._model.dof_damping[self._layout.joint_v]
         self._noise = (noise or SensorNoise()) if sensors == "noisy" else None
         self._period, self._substeps = control_period, round(control_period / timestep)
         self._closed = False
@@ -178,6 +180,11 @@ class MujocoPlant(Plant):
     def robot(self) -> str:
         """See ``Plant.robot``."""
         return self._description.profile.name
+
+    @property
+    def joint_damping(self) -> Array12:
+        """What a user's own ``mjcf`` says; of a robot that is built here nobody is told."""
+        return self._damping.copy()
 
     @property
     def control_period(self) -> float:
