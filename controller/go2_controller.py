@@ -21,7 +21,7 @@ from go2_wbc.contacts import Gait
 from go2_wbc.errors import ClosedError, CommandError, Go2WbcError, ModeError, TimelineError
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import VelocityCommand, finite_number
-from go2_wbc.planning.pose import BodyPose
+from go2_wbc.planning.trunk import BodyPose
 from go2_wbc.plant import MujocoPlant, Plant
 from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description

@@ -21,11 +21,9 @@ if TYPE_CHECKING:
     from go2_wbc.recording import Recording
     from go2_wbc.reference import JointReference, Reference
     from go2_wbc.robot.model import RobotModel
-    from go2_wbc.robot.snapshot import Snapshot
-    from go2_wbc.robot.state import JointCommand, RobotState
+    from go2_wbc.robot.state import JointCommand, RobotState, Snapshot
     from go2_wbc.wbc.config import WbcConfig
-    from go2_wbc.wbc.controller import WholeBodyController
-    from go2_wbc.wbc.solution import WbcSolution
+    from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
     from go2_wbc.wbc.tasks import Task
     from go2_wbc.world import World
 

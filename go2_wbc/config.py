@@ -24,7 +24,7 @@ from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.planning.command import VelocityEnvelope
 from go2_wbc.planning.locomotion import LocomotionConfig
-from go2_wbc.planning.pose import PoseEnvelope
+from go2_wbc.planning.trunk import PoseEnvelope
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.motor import TORQUE_SPEED, require_motor
 from go2_wbc.robot.payload_estimation import PayloadConfig

@@ -14,7 +14,6 @@ from dataclasses import InitVar, dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float
 
-from go2_wbc.compilation import subroutine
 from go2_wbc.errors import CommandError, ConfigError, unknown_name
 from go2_wbc.legs import LEGS
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, Retired, ranged, retires
@@ -147,18 +146,6 @@ class Stride:
             raise ConfigError(
                 f"Stride needs stance_min <= stance_max and swing > swing_slope, got {self}"
             )
-
-    def at(self, speed: float) -> tuple[float, float]:
-        """Period [s] and duty at a ``speed`` [m/s]."""
-        return stride_at(self, speed)
-
-
-@subroutine
-def stride_at(c: Stride, speed: float) -> tuple[float, float]:
-    """Period [s] and duty at a ``speed`` [m/s]."""
-    stance = min(max(c.reach / max(speed, TIE), c.stance_min), c.stance_max)
-    period = stance + c.swing + c.swing_slope * (speed - 1.0)
-    return period, stance / period
 
 
 @dataclass(frozen=True, slots=True)

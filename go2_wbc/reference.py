@@ -20,7 +20,7 @@ from go2_wbc.errors import CommandError
 from go2_wbc.lazy import moved_names
 from go2_wbc.records import Record
 from go2_wbc.robot.rotations import yaw_rotation
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 
 LEAST_WEIGHT, MOST_WEIGHT = 1e-6, 1e2
 """Of the force regularisation: beyond them accuracy is lost."""

@@ -20,7 +20,6 @@ import warnings
 from collections.abc import Callable
 from dataclasses import InitVar, dataclass
 from numbers import Real
-from types import ModuleType
 from typing import Any, TypeGuard, TypeVar
 
 from go2_wbc.errors import ConfigError
@@ -89,11 +88,10 @@ class Retired:
     instead: str
 
 
-def past_table(module: ModuleType, *names: str) -> object:
-    """A retired table of a file: its keys, and the constants of ``module`` that they are now."""
-    keys = {name: getattr(module, name.upper()) for name in names}
+def past_table(table: str, **keys: float) -> object:
+    """A retired ``table`` of a file: its keys, and the constants that they are now."""
     kinds = [(name, type(value), value) for name, value in keys.items()]
-    return dataclasses.make_dataclass(module.__name__, kinds, frozen=True)()
+    return dataclasses.make_dataclass(table, kinds, frozen=True)()
 
 
 def retires(**names: object) -> Callable[[_Class], _Class]:

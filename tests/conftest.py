@@ -57,7 +57,7 @@ UNCHECKED = frozenset(
         "go2_wbc.lazy",  # loaded by the pytest plugin's package
         "go2_wbc.planning.swing",
         "go2_wbc.robot.rotations",
-        "go2_wbc.robot.snapshot",
+        "go2_wbc.robot.state",
     }
 )
 IS_CHECKING = os.environ.get("GO2_WBC_TYPECHECK", "1") != "0"

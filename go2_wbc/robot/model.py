@@ -20,8 +20,7 @@ from go2_wbc.robot.description import RobotDescription, find_description
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.rigid_body import RigidBodies, fill_snapshot
-from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.state import RobotState, Snapshot
 from go2_wbc.world import PAYLOAD_HALF_SIZE, World
 
 FOOT_RADIUS = 0.022

@@ -8,7 +8,7 @@ import numpy as np
 
 from go2_wbc.records import Array3
 from go2_wbc.reference import LEAST_WEIGHT, MOST_WEIGHT
-from go2_wbc.robot.joint_friction import JointFriction
+from go2_wbc.robot.motor import JointFriction
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, Rule, between, ranged
 
 WEIGHTS = (1e-3, 1e3)
