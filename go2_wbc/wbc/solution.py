@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.brief import brief
 from go2_wbc.errors import ResidualRow
 from go2_wbc.records import Array4x3, Array12, Array18, Array30, layout_of
 from go2_wbc.robot.state import JointCommand
@@ -39,6 +40,8 @@ class WbcSolution:
     _formulate: Callable[[], Problem]
     _z: Array30
     is_relaxed: bool = False
+
+    __repr__ = brief
 
     @staticmethod
     def of_row(
