@@ -142,7 +142,7 @@ def require(config: object, rule: Rule, *names: str) -> None:
                 )
 
 
-def is_finite_number(value: object) -> TypeGuard[Real]:
+def is_finite_number(value: object) -> TypeGuard[float]:
     """Whether ``value`` is a number that a float can hold, and finite; True and False are none."""
     if isinstance(value, bool) or not isinstance(value, Real):
         return False
