@@ -444,6 +444,7 @@ class GO2Controller:
                 del self._turn["call"]
 
     def _run(self, call: _Call, procedure: Callable[[], Measurements]) -> bool:
+        _log.info("%s() at %.2f s", call.name, call.start)
         try:
             self._pilot.begin()
             measured = procedure()
@@ -465,7 +466,9 @@ class GO2Controller:
         self._last = Outcome(ok, reason, duration, dict(measured or {}))
         fault = self._runner.loop.fault
         is_known = fault is not None and fault.reason in reason  # the loop has logged it
-        if not (ok or is_known):
+        if ok:
+            _log.info("%s() after %.2f s: %s", call.name, duration, reason)
+        elif not is_known:
             _log.warning("%s", reason)
 
     def _check_open(self) -> None:
