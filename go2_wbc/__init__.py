@@ -5,6 +5,8 @@ Its public names, each imported when it is first used.
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from go2_wbc.lazy import lazy_exports
@@ -63,6 +65,20 @@ __all__ = [
 __version__: str
 
 _public = lazy_exports(__name__)
+
+
+def _require_not_hidden(*packages: str) -> None:
+    """Raise ImportError if a file of the user's is imported in place of a package of ours."""
+    for name in packages:
+        spec = find_spec(name)
+        if spec and spec.origin and Path(spec.origin).parents[1] != Path(__file__).parents[1]:
+            raise ImportError(
+                f"{spec.origin} hides the package {name!r} of go2-wbc: rename it, "
+                f"for example to my_{name}"
+            )
+
+
+_require_not_hidden("controller", "motions", "viz")
 
 
 def __getattr__(name: str) -> object:

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
+from go2_wbc.brief import brief
 from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.planning.command import VelocityEnvelope
@@ -65,6 +66,8 @@ class Config:
     feasibility: FeasibilityLimits = field(default_factory=FeasibilityLimits)
     backend: str = "condensed"
     motor: str = TORQUE_SPEED
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         """Raise ConfigError for an unknown motor."""

@@ -14,6 +14,7 @@ from dataclasses import InitVar, dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.brief import brief
 from go2_wbc.errors import CommandError, ConfigError, unknown_name
 from go2_wbc.legs import LEGS
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, Retired, ranged, retires
@@ -71,6 +72,8 @@ class ContactSchedule:
     period: float | None = None
     since: Float[np.ndarray, "n 4"] = field(init=False, repr=False)
     until: Float[np.ndarray, "n 4"] = field(init=False, repr=False)
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         """Check the order of the events and find each foot's changes."""
@@ -182,6 +185,8 @@ class Gait:
     envelope_share: float = 1.0
     starts_at_once: bool = False
     width: float = 1.0
+
+    __repr__ = brief
 
     def __post_init__(self, needs_mpc: bool) -> None:
         """Raise ConfigError for an apex or offset that is out of range."""

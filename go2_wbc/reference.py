@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.brief import brief
 from go2_wbc.compilation import kernel
 from go2_wbc.errors import CommandError
 from go2_wbc.lazy import moved_names
@@ -165,6 +166,8 @@ class Reference:
     stance: Bool[np.ndarray, "4"] = field(init=False)
     _row: Float[np.ndarray, " size"] | None = field(init=False, repr=False, default=None)
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         """Find the feet in stance."""
         stance = np.array([task is LegTask.STANCE for task in self.legs])
@@ -285,6 +288,8 @@ class JointReference:
     v_joints: Float[np.ndarray, "12"]
     kp: float
     kd: float
+
+    __repr__ = brief
 
     @property
     def stance(self) -> Bool[np.ndarray, "4"]:

@@ -140,9 +140,14 @@ def require(config: object, rule: Rule, *names: str) -> None:
                 )
 
 
-def is_finite_number(value: object) -> TypeGuard[Real]:
-    """Whether ``value`` is a finite number; True and False are none."""
-    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+def is_finite_number(value: object) -> TypeGuard[float]:
+    """Whether ``value`` is a number that a float can hold, and finite; True and False are none."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer beyond every float
+        return False
 
 
 def warn_retired(name: str, instead: str) -> None:

@@ -48,6 +48,7 @@ UNCHECKED = frozenset(
         "motions.pytest_plugin",
         "go2_wbc.contacts",
         "go2_wbc.curves",
+        "go2_wbc.brief",
         "go2_wbc.compilation",  # loaded here, as is what it imports
         "go2_wbc.kept_code",
         "go2_wbc.machine_code",

@@ -7,6 +7,7 @@ quantity of the tick, by ``robot.rigid_body`` if the robot's legs turn about the
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
@@ -119,6 +120,8 @@ class RobotModel:
             state: measured.
             payload: what the trunk carries beside what the model has.
         """
+        if not state.q.flags.writeable:  # compiled code takes what it may write to
+            state = replace(state, q=state.q.copy(), v=state.v.copy())
         robot = self._bodies
         if robot is None:
             return self.pinocchio_snapshot(state, payload)

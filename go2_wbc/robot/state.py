@@ -12,11 +12,12 @@ to the material point.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.brief import brief
 from go2_wbc.errors import CommandError
 from go2_wbc.records import Array3, Array3x3, Array4, Array4x3, Array12, Array18, Array19, Record
 
@@ -42,6 +43,19 @@ class RobotState:
     tau: Array12
     foot_forces: Array4
     feet_in_contact: Bool[np.ndarray, "4"]
+
+    def __repr__(self) -> str:
+        """When and where."""
+        place = ", ".join(f"{part:.3f}" for part in self.p_world_base.tolist())
+        angles = ", ".join(f"{angle:.1f}" for angle in np.degrees(self.rpy).tolist())
+        return f"RobotState(at {self.time:.3f} s: base ({place}) m, rpy ({angles}) deg)"
+
+    def read_only(self) -> RobotState:
+        """The same; an attempt to write into its arrays ends in an error."""
+        arrays = [getattr(self, part.name).copy() for part in fields(self)[1:]]
+        for array in arrays:
+            array.flags.writeable = False
+        return RobotState(self.time, *arrays)
 
     @property
     def p_world_base(self) -> Array3:
@@ -194,6 +208,8 @@ class JointCommand:
     v_des: Array12
     kp: Array12
     kd: Array12
+
+    __repr__ = brief
 
     def asked(self, q: Array12, v: Array12) -> Array12:
         """Torques [N m] asked for at angles ``q`` and velocities ``v``, before any limit."""

@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.algebra.active_set import SOLVED
+from go2_wbc.brief import brief
 from go2_wbc.errors import ConfigError, QpInfeasible, ResidualRow, unknown_name
 from go2_wbc.records import Array4x3, Array12, Array18, Array30, layout_of, packed
 from go2_wbc.reference import BodyTarget, Reference, Target
@@ -69,6 +70,8 @@ class WbcSolution:
     _formulate: Callable[[], Problem]
     _z: Array30
     is_relaxed: bool = False
+
+    __repr__ = brief
 
     @staticmethod
     def of_row(
