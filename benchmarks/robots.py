@@ -75,7 +75,7 @@ def menagerie_go2() -> Path:
 
     It weighs 15 kg because rotors weigh nothing, and its calves end above the feet.
     """
-    joints = JointDynamics(armature=(0.01,) * 3, damping=(2.0,) * 3, friction_loss=(0.2,) * 3)
+    joints = JointDynamics((0.01, 0.01, 0.01), (2.0, 2.0, 2.0), (0.2, 0.2, 0.2))
     spec = build_spec(find_description(), joints, friction=0.6)
     spec.option.impratio = 100.0
     for body in spec.bodies:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from go2_wbc.legs import LEGS, Leg
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 
 STILL_SPEED = 0.05
 """Speed [m/s] of the base below which it counts as still."""
