@@ -98,10 +98,11 @@ def _with_damping(config: Config, plant: Plant) -> Config:
     A leg of 0.3 kg at the foot that meets 2 N m s/rad is slowed down by 100 1/s: without it no foot
     would swing to its place in time.
     """
-    own, damping = config.wbc.joint_friction, plant.joint_damping
-    if any(own.viscous) or not damping.any():
+    own = config.wbc.joint_friction
+    if any(own.viscous) or not any(plant.joint_damping):
         return config
-    friction = replace(own, viscous=tuple((VISCOUS_SHARE * damping).tolist()))
+    viscous = tuple(VISCOUS_SHARE * damping for damping in plant.joint_damping)
+    friction = replace(own, viscous=viscous)
     return replace(config, wbc=replace(config.wbc, joint_friction=friction))
 
 

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
-import numpy as np
-
-from go2_wbc.records import Array12
 from go2_wbc.robot.profile import GO2
 from go2_wbc.robot.state import JointCommand, PartFault, RobotState
 
@@ -15,22 +12,19 @@ class Plant(ABC):
     """A robot that can be read and commanded; its clock is the only clock of the controller.
 
     One control tick is ``read()``, then ``write(command)``, which lets one control period pass.
+
+    Attributes:
+        robot: name of the profile of the robot that it is.
+        joint_damping: viscous friction of the joints [N m s/rad], if it is written down, else 0.
     """
+
+    robot: str = GO2
+    joint_damping: tuple[float, ...] = (0.0,) * 12
 
     @property
     @abstractmethod
     def control_period(self) -> float:
         """Seconds that pass in one ``write``."""
-
-    @property
-    def robot(self) -> str:
-        """Name of the profile of the robot that it is."""
-        return GO2
-
-    @property
-    def joint_damping(self) -> Array12:
-        """Viscous friction of the joints [N m s/rad], as far as it is written down; else 0."""
-        return np.zeros(12)
 
     @property
     def is_live(self) -> bool:

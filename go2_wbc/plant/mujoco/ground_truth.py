@@ -15,7 +15,6 @@ from jaxtyping import Bool, Float, Int
 from go2_wbc.plant.base import Plant
 from go2_wbc.plant.mujoco.contacts import Contacts, foot_contacts, touches_itself
 from go2_wbc.plant.mujoco.plant import MujocoPlant
-from go2_wbc.records import Array12
 from go2_wbc.robot.description import BASE_LINK
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand, PartFault, RobotState
@@ -131,6 +130,7 @@ class GroundTruth(Plant):
     def __init__(self, plant: MujocoPlant) -> None:
         """Record what a controller does to ``plant``."""
         self._plant = plant
+        self.robot, self.joint_damping = plant.robot, plant.joint_damping
         self._base = plant.model.body(BASE_LINK).id
         self.on_tick: Callable[[], None] | None = None
         self.cpu_time = 0.0
@@ -150,16 +150,6 @@ class GroundTruth(Plant):
     def sensor_faults(self) -> tuple[PartFault, ...]:
         """Those of the plant."""
         return self._plant.sensor_faults
-
-    @property
-    def robot(self) -> str:
-        """That of the plant."""
-        return self._plant.robot
-
-    @property
-    def joint_damping(self) -> Array12:
-        """That of the plant."""
-        return self._plant.joint_damping
 
     @property
     def body_contact_force(self) -> float | None:

@@ -26,10 +26,10 @@ from go2_wbc.plant.mujoco.settling import LYING_DAMPING, settle
 from go2_wbc.plant.mujoco.setup import PlantSetup, prepare
 from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors, SensorNoise
 from go2_wbc.plant.terrain import Terrain
-from go2_wbc.records import Array12, packed
+from go2_wbc.records import packed
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel, drive
+from go2_wbc.robot.motor import TORQUE_SPEED, drive
 from go2_wbc.robot.profile import GO2
 from go2_wbc.robot.state import JointCommand, OdometryCovariance, PartFault, RobotState
 from go2_wbc.world import SENSORS
@@ -69,8 +69,7 @@ class MujocoPlant(Plant):
         control_period: seconds per ``write``, an integer multiple of ``timestep``.
         friction: sliding friction coefficient; ``None`` is 0.8, or what ``mjcf`` says. With
             ``mjcf`` a number applies to the feet's contacts.
-        payload: extra mass [kg], a solid box.
-        payload_place: of its middle in the base frame [m].
+        payload: extra mass [kg], a solid box; payload_place: of its middle in the base frame [m].
         mass_scale: factor on every mass and inertia of the robot, payload excepted.
         terrain: the ground (``plant.terrain``), where it is not a level floor; only without
             ``mjcf``.
@@ -82,9 +81,9 @@ class MujocoPlant(Plant):
         seed: of both and of ``initial_joint_noise``.
         initial_yaw: heading at the start [rad].
         initial_joint_noise: standard deviation [rad] of the joint angles from which it settles.
-        joint_dynamics: friction, damping, armature; ``None`` is the profile's, or what
-            ``mjcf`` says.
-        motor: ``"torque-speed"``, or ``"ideal"`` for the peak torque at every speed.
+        joint_dynamics: friction, damping, armature; ``None`` is the profile's, or the file's.
+        motor: ``"torque-speed"``, or ``"ideal"`` for the peak torque at every speed; kept as a
+            ``MotorModel`` of this robot.
         urdf: another URDF instead of the installed one.
         robot: name of its profile: "go2", "a1" or "go1".
         visuals: also load the visual meshes (slower), for the viewer and for rendering.
@@ -145,14 +144,14 @@ class MujocoPlant(Plant):
         start_rng, self._rng = np.random.default_rng(seed).spawn(2)
         # MuJoCo's warnings would otherwise go to a file in the working directory.
         mujoco.set_mju_user_warning(partial(_logger.warning, "MuJoCo: %s"))
-        self._model, self._layout, self._motor, self._description = prepare(setup)
+        self._model, self._layout, self.motor, self._description = prepare(setup)
         self._data = mujoco.MjData(self._model)
-        is_written = mjcf is not None and joint_dynamics is None
-        self._damping = is_written * self._model.dof_damping[self._layout.joint_v]
+        self.robot = self._description.profile.name
+        if mjcf is not None and joint_dynamics is None:  # of what is built here nobody is told
+            self.joint_damping = tuple(self._model.dof_damping[self._layout.joint_v].tolist())
         self._noise = (noise or SensorNoise()) if sensors == "noisy" else None
         self._period, self._substeps = control_period, round(control_period / timestep)
-        self._closed = False
-        self._ticks = 0
+        self._closed, self._ticks = False, 0
         self._late, self._acting = round(delay / control_period), np.zeros((5, 12))
         self._waiting: deque[Float[np.ndarray, "5 12"]] = deque()  # commands that do not act yet
         self._faults = Faults(self._description)
@@ -172,19 +171,9 @@ class MujocoPlant(Plant):
         self._ticks, self._data.time = 0, 0.0
         if sensors == "imu":
             errors = errors or SensorErrors()
-            own = RobotModel(self._description)
-            self._senses = Proprioception(errors, own, control_period, self._rng, estimator)
+            own = RobotModel(self._description), control_period, self._rng
+            self._senses = Proprioception(errors, *own, estimator)
             self._sense()
-
-    @property
-    def robot(self) -> str:
-        """See ``Plant.robot``."""
-        return self._description.profile.name
-
-    @property
-    def joint_damping(self) -> Array12:
-        """What a user's own ``mjcf`` says; of a robot that is built here nobody is told."""
-        return self._damping.copy()
 
     @property
     def control_period(self) -> float:
@@ -200,11 +189,6 @@ class MujocoPlant(Plant):
     def torque_limits(self) -> Float[np.ndarray, "12"]:
         """Largest torque of each joint [N m]."""
         return self._layout.torque_limits.copy()
-
-    @property
-    def motor(self) -> MotorModel:
-        """What the motors give at which speed."""
-        return self._motor
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -470,7 +454,7 @@ class MujocoPlant(Plant):
         """Binds the kernels of a tick and the arrays of MuJoCo's that they read and fill."""
         data, layout = self._data, self._layout
         places = np.array([layout.joint_q, layout.joint_v, layout.motors], dtype=np.int64)
-        self._motors = (packed(self._motor), places, data.qpos, data.qvel, data.ctrl)
+        self._motors = (packed(self.motor), places, data.qpos, data.qvel, data.ctrl)
         state = (data.qpos, data.qvel, self._R_world_base)
         base = (layout.base_q.start, layout.base_v.start)
         self._read_joints = partial(read_joints, *state, *base, places)
