@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
@@ -83,6 +83,8 @@ WRONG: tuple[tuple[str, tuple[Any, ...]], ...] = (
     ("wait", (-1.0,)),
 )
 """Calls whose arguments are wrong."""
+STEEP_GAITS = ("pace", "bound")
+"""Both feet of a side, or of an end, stand beside the CoM: that asks for more friction than 0.3."""
 FREE = ("recover", "wait", "damp", "stop")
 """What a robot that has fallen may be told."""
 
@@ -97,6 +99,7 @@ class World:
         room: share by which True may be worse, and False must be better, than the limit that the
             documentation names.
         settings: of ``MujocoPlant``; on every other seed the ``others``, if there are any.
+        gaits: that are drawn.
     """
 
     name: str
@@ -104,6 +107,7 @@ class World:
     room: float
     settings: Mapping[str, Any]
     others: Mapping[str, Any] = field(default_factory=dict)
+    gaits: tuple[str, ...] = (*GAITS, "trot", "trot", "auto")
 
     def plant(self, seed: int) -> MujocoPlant:
         """The simulated robot of a trial."""
@@ -115,7 +119,13 @@ class World:
 
 WORLDS = (
     World("level", "friction 0.6", 0.05, {"friction": 0.6}),
-    World("slippery", "friction 0.3, 3 kg", 0.05, {"friction": 0.3, "payload": 3.0}),
+    World(
+        "slippery",
+        "friction 0.3, 3 kg",
+        0.05,
+        {"friction": 0.3, "payload": 3.0},
+        gaits=tuple(name for name in (*GAITS, "trot", "trot", "auto") if name not in STEEP_GAITS),
+    ),
     World(
         "uneven",
         "boxes of 6 cm, or 8 deg",
@@ -155,12 +165,12 @@ class Call:
         return f"{self.name}({', '.join(map(str, self.arguments))}){other}; {self.pause:.1f} s"
 
 
-def drawn(rng: np.random.Generator, mode: Mode) -> Call:
+def drawn(rng: np.random.Generator, mode: Mode, gaits: Sequence[str]) -> Call:
     """A random call to a robot in this mode: it seldom asks of one that does not walk to go."""
     scale = rng.choice([0.0, 0.4, 1.0, 5.0])
     arguments: dict[str, tuple[Any, ...]] = {
         **dict.fromkeys((*POSTURES, "stop", "damp"), ()),
-        "walk": (str(rng.choice(["trot", "trot", *GAITS, "auto"])),),
+        "walk": (str(rng.choice(gaits)),),
         "high_five": (str(rng.choice([*SIDES])), round(float(rng.uniform(0.5, 2.0)), 2)),
         "turn_left": (round(float(rng.uniform(-2.0, 2.0)), 3),),
         "turn_right": (round(float(rng.normal(0.0, 0.5)), 3),),
@@ -454,7 +464,7 @@ def measure_sequence(
     with TrialRobot(world.plant(seed)) as robot, suppress(_Hangs):
         judge = Judge(robot, world.room)
         while len(calls) < CALLS:
-            calls.append(drawn(rng, robot.go2.mode))
+            calls.append(drawn(rng, robot.go2.mode, world.gaits))
             judge.make(calls[-1])
     found.values |= {name: float(len(wrong)) for name, wrong in judge.found.items()}
     found.failures |= {name: "; ".join(wrong) for name, wrong in judge.found.items() if wrong}
