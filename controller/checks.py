@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Float
 
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.state import Snapshot
@@ -47,7 +48,12 @@ def com_height(snapshot: Snapshot) -> float:
 
     On a slope or with feet on steps the lowest foot says little.
     """
-    feet = snapshot.p_world_feet - snapshot.p_world_com
+    return _over_feet(snapshot, snapshot.p_world_com)
+
+
+def _over_feet(snapshot: Snapshot, p_world: Float[np.ndarray, "3"]) -> float:
+    """Height [m] of a point above the plane through the feet, straight below it."""
+    feet = snapshot.p_world_feet - p_world
     plane = np.column_stack([np.ones(4), feet[:, :2]])
     below = np.linalg.lstsq(plane, feet[:, 2], rcond=None)[0]
     return float(snapshot.foot_radius) - float(below[0])
@@ -82,7 +88,8 @@ def is_standing(snapshot: Snapshot) -> bool:
 def is_sitting(snapshot: Snapshot) -> bool:
     """Whether the robot sits still: rump down, trunk up, four feet on the ground."""
     height, pitch = snapshot.profile.sit
-    return _is_on_its_feet(snapshot, base_height(snapshot) - height, pitch)
+    over = _over_feet(snapshot, snapshot.state.p_world_base)
+    return _is_on_its_feet(snapshot, over - height, pitch)
 
 
 def is_lying(snapshot: Snapshot) -> bool:

@@ -261,7 +261,12 @@ class GO2Controller:
         return self._call("high_five", lambda: self._pilot.play(plan, stands_up=True))
 
     def play(
-        self, motion: motions.Playable, *, check: bool = True, allow_dynamic: bool = False
+        self,
+        motion: motions.Playable,
+        *,
+        times: int = 1,
+        check: bool = True,
+        allow_dynamic: bool = False,
     ) -> bool:
         """Play a motion: a name of the library, a saved motion's file, a timeline, or a plan.
 
@@ -269,12 +274,14 @@ class GO2Controller:
 
         Args:
             motion: a ``Playable``.
+            times: how often, one after the other; what is measured is of the last one.
             check: with False also one that the robot cannot do is played, to see what happens.
             allow_dynamic: let also a robot that may be a real one (``Plant.is_hardware``) play
                 motions with flight or on fewer than three feet. Simulated ones always do.
 
         Raises:
-            CommandError: for an unknown name; lists the valid ones. Also for what is no motion.
+            CommandError: for an unknown name; lists the valid ones. Also for what is no motion, or
+                a number of times that is no whole number of 1 or more.
             TimelineError: for an empty timeline.
             MotionFileError: for a file that cannot be used.
             DynamicMotionRefused: for a dynamic motion on hardware without ``allow_dynamic``.
@@ -282,12 +289,17 @@ class GO2Controller:
             MotionInfeasible: if the motion breaks a limit of the robot; carries the findings.
         """
         self._check_open()
+        if isinstance(times, bool) or not isinstance(times, int) or times < 1:
+            raise CommandError(f"times must be a whole number of 1 or more, got {times!r}")
         plan = self.prepare(motion, check=check)
         with self._planning:
             departed = self._checker.departure(plan)
 
         def play() -> Measurements:
-            return {**self._pilot.play(plan, allow_dynamic=allow_dynamic), **departed}
+            measured: Measurements = {}
+            for _ in range(times):
+                measured = self._pilot.play(plan, allow_dynamic=allow_dynamic)
+            return {**measured, **departed}
 
         return self._call("play", play)
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import logging
 import math
 from collections import deque
-from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import NoReturn
 
 import mujoco
 import numpy as np
@@ -21,15 +20,15 @@ from go2_wbc.plant.faults import Faults, InjectedFault
 from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN, bin_forces, read_joints
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
-from go2_wbc.plant.mujoco.pushes import Push, Pushes
+from go2_wbc.plant.mujoco.pushes import Pushes
 from go2_wbc.plant.mujoco.settling import LYING_DAMPING, settle
-from go2_wbc.plant.mujoco.setup import PlantSetup, prepare
+from go2_wbc.plant.mujoco.setup import PlantSetup, SavedPhysics, prepare
 from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors, SensorNoise
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.records import packed
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.motor import TORQUE_SPEED, drive
+from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel, drive
 from go2_wbc.robot.profile import GO2
 from go2_wbc.robot.state import JointCommand, OdometryCovariance, PartFault, RobotState
 from go2_wbc.world import SENSORS
@@ -38,22 +37,6 @@ _logger = logging.getLogger(__name__)
 
 # N; a foot reads a contact above this. A standing foot carries about 40 N, so 1 N is "touching".
 FOOT_CONTACT_THRESHOLD = 1.0
-
-
-class SavedPhysics(NamedTuple):
-    """Everything that decides how a ``MujocoPlant`` goes on; see ``MujocoPlant.save``."""
-
-    integration: Float[np.ndarray, " n"]
-    ticks: int
-    pushes: tuple[Push, ...]
-    waiting: tuple[Float[np.ndarray, "5 12"], ...]
-    tau: Float[np.ndarray, "12"]
-    forces: Float[np.ndarray, "6"]
-    noise_state: Mapping[str, Any]
-    state: RobotState | None
-    imu: ImuSample | None
-    senses: Mapping[str, Any] | None
-    faults: Mapping[str, Any]
 
 
 class MujocoPlant(Plant):
@@ -82,8 +65,7 @@ class MujocoPlant(Plant):
         initial_yaw: heading at the start [rad].
         initial_joint_noise: standard deviation [rad] of the joint angles from which it settles.
         joint_dynamics: friction, damping, armature; ``None`` is the profile's, or the file's.
-        motor: ``"torque-speed"``, or ``"ideal"`` for the peak torque at every speed; kept as a
-            ``MotorModel`` of this robot.
+        motor: ``"torque-speed"``, or ``"ideal"`` for the peak torque at every speed.
         urdf: another URDF instead of the installed one.
         robot: name of its profile: "go2", "a1" or "go1".
         visuals: also load the visual meshes (slower), for the viewer and for rendering.
@@ -144,7 +126,7 @@ class MujocoPlant(Plant):
         start_rng, self._rng = np.random.default_rng(seed).spawn(2)
         # MuJoCo's warnings would otherwise go to a file in the working directory.
         mujoco.set_mju_user_warning(partial(_logger.warning, "MuJoCo: %s"))
-        self._model, self._layout, self.motor, self._description = prepare(setup)
+        self._model, self._layout, self._motor, self._description = prepare(setup)
         self._data = mujoco.MjData(self._model)
         self.robot = self._description.profile.name
         if mjcf is not None and joint_dynamics is None:  # of what is built here nobody is told
@@ -189,6 +171,11 @@ class MujocoPlant(Plant):
     def torque_limits(self) -> Float[np.ndarray, "12"]:
         """Largest torque of each joint [N m]."""
         return self._layout.torque_limits.copy()
+
+    @property
+    def motor(self) -> MotorModel:
+        """What the motors give at which speed."""
+        return self._motor
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -454,7 +441,7 @@ class MujocoPlant(Plant):
         """Binds the kernels of a tick and the arrays of MuJoCo's that they read and fill."""
         data, layout = self._data, self._layout
         places = np.array([layout.joint_q, layout.joint_v, layout.motors], dtype=np.int64)
-        self._motors = (packed(self.motor), places, data.qpos, data.qvel, data.ctrl)
+        self._motors = (packed(self._motor), places, data.qpos, data.qvel, data.ctrl)
         state = (data.qpos, data.qvel, self._R_world_base)
         base = (layout.base_q.start, layout.base_v.start)
         self._read_joints = partial(read_joints, *state, *base, places)

@@ -1,21 +1,28 @@
-"""Turns a plant's settings into a compiled model."""
+"""Turns a plant's settings into a compiled model; and what is saved of a plant."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import mujoco
+import numpy as np
+from jaxtyping import Float
 
 from go2_wbc.errors import ConfigError, DescriptionError, ModelMismatch
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.mujoco.layout import MujocoLayout, find_layout, foot_geoms
 from go2_wbc.plant.mujoco.model import JointDynamics, add_payload, build_spec, finish
+from go2_wbc.plant.mujoco.pushes import Push
 from go2_wbc.plant.mujoco.user_model import load_user_model
+from go2_wbc.plant.sensors import ImuSample
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.robot.description import BASE_LINK, RobotDescription, find_description
 from go2_wbc.robot.motor import MotorModel, require_motor
+from go2_wbc.robot.state import RobotState
 from go2_wbc.validation import FINITE, NOT_NEGATIVE, POSITIVE, between, ranged
 from go2_wbc.world import RANGES
 
@@ -71,6 +78,22 @@ class PlantSetup:
             )
         if self.mjcf is not None and self.terrain is not None:
             raise ConfigError("terrain is only for the built model; put it into the mjcf instead")
+
+
+class SavedPhysics(NamedTuple):
+    """Everything that decides how a ``MujocoPlant`` goes on; see ``MujocoPlant.save``."""
+
+    integration: Float[np.ndarray, " n"]
+    ticks: int
+    pushes: tuple[Push, ...]
+    waiting: tuple[Float[np.ndarray, "5 12"], ...]
+    tau: Float[np.ndarray, "12"]
+    forces: Float[np.ndarray, "6"]
+    noise_state: Mapping[str, Any]
+    state: RobotState | None
+    imu: ImuSample | None
+    senses: Mapping[str, Any] | None
+    faults: Mapping[str, Any]
 
 
 def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout, MotorModel, RobotDescription]:
