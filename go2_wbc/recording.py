@@ -11,6 +11,8 @@ from itertools import groupby, pairwise
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from go2_wbc.brief import cut
+
 
 @dataclass(frozen=True, slots=True)
 class Span:
@@ -52,6 +54,11 @@ class Recording:
     p_world_com: Float[np.ndarray, "n 3"]
     support_margin: Float[np.ndarray, " n"]
     labels: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        """How long, and what was done."""
+        done = " ".join(label for label, _ in groupby(self.labels))
+        return cut(f"Recording({len(self.time)} samples, {self.duration:.2f} s: {done})")
 
     @property
     def duration(self) -> float:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import re
 import sys
+from pathlib import Path
 from types import FunctionType
 
 import numpy as np
 import pytest
 from jaxtyping import Float, TypeCheckError
 
+import controller
+import go2_wbc
+import motions
+import viz
 from go2_wbc.errors import unknown_name
 from go2_wbc.robot.state import JointCommand
 from tests import conftest, typechecker
@@ -97,3 +103,10 @@ def test_every_module_that_is_loaded_went_through_the_hook() -> None:
 
 def test_every_exempted_module_exists() -> None:
     assert set(conftest.our_modules()) >= conftest.UNCHECKED
+
+
+def test_the_script_that_type_checkers_read_uses_every_public_name() -> None:
+    script = (Path(__file__).parent / "user_script.py").read_text(encoding="utf-8")
+    names = {name for package in (controller, go2_wbc, motions, viz) for name in package.__all__}
+    used = set(re.findall(r"\w+", script.partition("@motion")[2]))
+    assert names <= used

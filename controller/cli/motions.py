@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import keyword
+import sys
 import textwrap
 from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -113,6 +115,8 @@ def new(
     """
     if not name.isidentifier() or keyword.iskeyword(name):
         raise CommandError(f"NAME must be a Python name such as my_motion, got {name!r}")
+    if name in sys.stdlib_module_names or find_spec(name) is not None:
+        raise CommandError(f"{name}.py would hide the module {name!r}: choose another name")
     shown = out / f"{name}.py"
     target = checked_output(shown, [".py"])
     if target.exists():

@@ -119,6 +119,11 @@ class CompiledPlan(MotionPlan):
     held: Mapping[str, Leg] = field(default_factory=dict)
     _asked: PlanCurves = field(init=False, repr=False)
 
+    def __repr__(self) -> str:
+        """Its name, length and ends."""
+        ends = f"{self.entry.value} to {self.exit.value}"
+        return f"CompiledPlan({self.name!r}, {self.duration:.2f} s, {ends})"
+
     def __post_init__(self) -> None:
         """Bind what the kernel reads; raise MotionError for other curves, or lengths of tables."""
         contacts, curves = self.contacts, self.curves

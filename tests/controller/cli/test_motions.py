@@ -115,6 +115,13 @@ def test_check_gives_json_with_every_margin(run: Run) -> None:
     assert report["margins"]["support"]["margin"] > 0.0
 
 
+@pytest.mark.parametrize("name", ["motions", "json", "numpy"])
+def test_a_new_motion_hides_no_module(name: str, tmp_path: Path, run: Run) -> None:
+    said = run("new", name, "--out", tmp_path, code=ExitCode.USAGE).err
+    assert f"would hide the module {name!r}" in said
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_new_motion_is_feasible_is_not_written_twice_and_is_told_to_a_program(
     tmp_path: Path, run: Run
 ) -> None:
