@@ -151,7 +151,9 @@ class ControlLoop:
                 as the plant still obeys, and the fault is noted; so for any other exception.
         """
         try:
-            if self._observe() and self.plant.motors_obey:
+            # What a limp robot's joint is asked for changes with its speed, also within a tick.
+            is_limp = isinstance(self.behaviour, Damped)
+            if self._observe() and self.plant.motors_obey and not is_limp:
                 acted = self._commands[max(-1 - self.latency.ticks, -len(self._commands))]
                 self._motors.update(acted, self.state, self.plant.control_period)
             self._look_after_parts()

@@ -45,7 +45,7 @@ class Config:
         wbc: whole-body controller.
         locomotion: locomotion planner.
         envelope: velocity commands that are followed. None, and so not configured: in simulation
-            ``planning.envelopes.TROT``, which was measured; where a real robot may be moved
+            that of the robot's profile, which was measured; where a real robot may be moved
             (``beside_hardware``) the default of ``VelocityEnvelope``.
         pose: poses of the trunk that are taken while walking.
         safety: when to give up.

@@ -41,6 +41,8 @@ class RobotProfile:
         friction_loss: their dry friction [N m].
         knee_share: speed from which a driving motor's torque falls, as a share of the speed
             without load (``robot.motor``).
+        envelope: speeds ahead, back, aside [m/s] and turning rate [rad/s] within which it trots
+            in simulation where nothing is configured.
         stand_height: height [m] of the CoM above the ground when standing.
         sit: height [m] of the base and pitch [rad] of the dog-like sit: rump down, front legs up.
         lie_height: height [m] of the base just above the ground, from which it goes limp.
@@ -61,6 +63,7 @@ class RobotProfile:
     damping: V3
     friction_loss: V3
     knee_share: float
+    envelope: tuple[float, float, float, float]
     stand_height: float
     sit: tuple[float, float]
     lie_height: float

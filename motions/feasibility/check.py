@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 
-from go2_wbc.brief import brief
+from go2_wbc.brief import brief, inline_html
 from go2_wbc.errors import CommandError, MotionError
 from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.legs import LEGS
@@ -57,6 +57,7 @@ class CheckedMotion:
     path: Trajectory
     forces: Forces
 
+    _repr_html_ = inline_html
     __repr__ = brief
 
     def recording(self) -> Recording:
