@@ -36,7 +36,7 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.plant.mujoco.model import JointDynamics
 from go2_wbc.plant.terrain import Boxes, Patch, Ramp, Slope, Stairs, Terrain
-from go2_wbc.robot.joint_friction import JointFriction
+from go2_wbc.robot.motor import JointFriction
 from motions.postures import STAND_HEIGHT
 
 FIRST_SEED = 14200

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.model import FOOT_RADIUS
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from motions.postures import SIT_POSE, STAND_HEIGHT, TUCKED_JOINTS
 
 STILL_SPEED = 0.05

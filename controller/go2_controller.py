@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import NoReturn
 
 import motions  # what is named motions.X below is imported when it is used, scipy with it
 from controller import arguments
@@ -21,7 +22,7 @@ from go2_wbc.contacts import Gait
 from go2_wbc.errors import ClosedError, CommandError, Go2WbcError, ModeError, TimelineError
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import VelocityCommand, finite_number
-from go2_wbc.planning.pose import BodyPose
+from go2_wbc.planning.trunk import BodyPose
 from go2_wbc.plant import MujocoPlant, Plant
 from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
@@ -250,7 +251,12 @@ class GO2Controller:
         return self._call("high_five", lambda: self._pilot.play(plan, stands_up=True))
 
     def play(
-        self, motion: motions.Playable, *, check: bool = True, allow_dynamic: bool = False
+        self,
+        motion: motions.Playable,
+        *,
+        times: int = 1,
+        check: bool = True,
+        allow_dynamic: bool = False,
     ) -> bool:
         """Play a motion: a name of the library, a saved motion's file, a timeline, or a plan.
 
@@ -258,12 +264,14 @@ class GO2Controller:
 
         Args:
             motion: a ``Playable``.
+            times: how often, one after the other; what is measured is of the last one.
             check: with False also one that the robot cannot do is played, to see what happens.
             allow_dynamic: let also a robot that may be a real one (``Plant.is_hardware``) play
                 motions with flight or on fewer than three feet. Simulated ones always do.
 
         Raises:
-            CommandError: for an unknown name; lists the valid ones. Also for what is no motion.
+            CommandError: for an unknown name; lists the valid ones. Also for what is no motion, or
+                a number of times that is no whole number of 1 or more.
             TimelineError: for an empty timeline.
             MotionFileError: for a file that cannot be used.
             DynamicMotionRefused: for a dynamic motion on hardware without ``allow_dynamic``.
@@ -271,12 +279,17 @@ class GO2Controller:
             MotionInfeasible: if the motion breaks a limit of the robot; carries the findings.
         """
         self._check_open()
+        if isinstance(times, bool) or not isinstance(times, int) or times < 1:
+            raise CommandError(f"times must be a whole number of 1 or more, got {times!r}")
         plan = self.prepare(motion, check=check)
         with self._planning:
             departed = self._checker.departure(plan)
 
         def play() -> Measurements:
-            return {**self._pilot.play(plan, allow_dynamic=allow_dynamic), **departed}
+            measured: Measurements = {}
+            for _ in range(times):
+                measured = self._pilot.play(plan, allow_dynamic=allow_dynamic)
+            return {**measured, **departed}
 
         return self._call("play", play)
 
@@ -326,8 +339,8 @@ class GO2Controller:
 
     @property
     def state(self) -> RobotState:
-        """The newest measured state."""
-        return self._runner.loop.state
+        """The newest measured state, a copy that cannot be written into."""
+        return self._runner.loop.state.read_only()
 
     @property
     def mode(self) -> Mode:
@@ -383,10 +396,21 @@ class GO2Controller:
         self.close()
 
     def __enter__(self) -> GO2Controller:
+        self._check_open()
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def __repr__(self) -> str:
+        """Who it is, what it does, and when."""
+        plant = type(self._plant).__name__
+        time = self._runner.loop.state.time
+        return f"<GO2Controller {self._namespace}: {self.mode.value}, {plant}, {time:.2f} s>"
+
+    def __reduce__(self) -> NoReturn:
+        """A robot is no value: it cannot be pickled or copied."""
+        raise TypeError("a GO2Controller holds a running robot: make one in each process")
 
     # --- how calls are made ---------------------------------------------------------------
 
@@ -409,7 +433,7 @@ class GO2Controller:
         self._check_open()
         if self._pilot.mode is Mode.FALLEN and not allow_fallen:
             raise ModeError(f"{name}() needs a robot that has not fallen: call recover() first")
-        call = _Call(name, self.state.time)
+        call = _Call(name, self._runner.loop.state.time)
         try:  # Ctrl-C may come anywhere: whose turn it is must be seen from what is stored
             running = self._turn.setdefault("call", call)  # looks and takes at once
             if running is not call:
@@ -432,6 +456,7 @@ class GO2Controller:
                 del self._turn["call"]
 
     def _run(self, call: _Call, procedure: Callable[[], Measurements]) -> bool:
+        _log.info("%s() at %.2f s", call.name, call.start)
         try:
             self._pilot.begin()
             measured = procedure()
@@ -449,10 +474,13 @@ class GO2Controller:
         self, call: _Call, reason: str, measured: Measurements | None = None, *, ok: bool = False
     ) -> None:
         """What came of ``call``."""
-        self._last = Outcome(ok, reason, self.state.time - call.start, dict(measured or {}))
+        duration = self._runner.loop.state.time - call.start
+        self._last = Outcome(ok, reason, duration, dict(measured or {}))
         fault = self._runner.loop.fault
         is_known = fault is not None and fault.reason in reason  # the loop has logged it
-        if not (ok or is_known):
+        if ok:
+            _log.info("%s() after %.2f s: %s", call.name, duration, reason)
+        elif not is_known:
             _log.warning("%s", reason)
 
     def _check_open(self) -> None:

@@ -29,11 +29,9 @@ from go2_wbc.robot.motor_watch import MotorWatch
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.payload_estimation import PayloadEstimator
 from go2_wbc.robot.safety import FallDetector, SafetyConfig, is_plausible
-from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.robot.state import Health, JointCommand, RobotState
-from go2_wbc.wbc.controller import WholeBodyController
+from go2_wbc.robot.state import Health, JointCommand, RobotState, Snapshot
+from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
 from go2_wbc.wbc.relaxation import is_grave
-from go2_wbc.wbc.solution import WbcSolution
 
 _log = logging.getLogger(__name__)
 
@@ -91,6 +89,7 @@ class ControlLoop:
         """
         self.plant, self.model, self.wbc, self.telemetry = plant, model, wbc, telemetry
         self._dynamic_wbc = dynamic_wbc or wbc
+        self._is_hardware = plant.is_hardware
         self._safety = safety
         self._falls = FallDetector(safety)
         self._sag = self._lean = 0.0
@@ -183,7 +182,7 @@ class ControlLoop:
         if is_finite and state.time > self.state.time:
             self._unanswered = 0
             self.state = state
-            self._ahead = state if self.plant.is_hardware else self.latency.ahead(state)
+            self._ahead = state if self._is_hardware else self.latency.ahead(state)
             self.snapshot = self.model.snapshot(self._ahead, self._payload_of(self.behaviour))
             return True
         silence = self._unanswered * self.plant.control_period

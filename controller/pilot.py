@@ -31,7 +31,7 @@ from go2_wbc.contacts import Gait
 from go2_wbc.errors import DynamicMotionRefused, ModeError, StanceMismatch
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
-from go2_wbc.planning.pose import LEVEL, BodyPose
+from go2_wbc.planning.trunk import LEVEL, BodyPose
 from go2_wbc.plant import Plant
 from motions.postures import lie_down, rise, sit_down
 

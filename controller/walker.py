@@ -10,7 +10,7 @@ from go2_wbc.contacts import GAITS, Gait, find_gait
 from go2_wbc.errors import CommandError, unknown_name
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.envelopes import AUTO, LADDER, GaitChoice, envelope_of
-from go2_wbc.planning.pose import LEVEL, BodyPose
+from go2_wbc.planning.trunk import LEVEL, BodyPose
 
 STOP_LIMIT = 4.0
 """Time [s] in which a walking robot must come to rest after ``stop``."""

@@ -20,11 +20,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
+from go2_wbc.brief import brief
 from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.planning.command import VelocityEnvelope
 from go2_wbc.planning.locomotion import LocomotionConfig
-from go2_wbc.planning.pose import PoseEnvelope
+from go2_wbc.planning.trunk import PoseEnvelope
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.motor import TORQUE_SPEED, require_motor
 from go2_wbc.robot.payload_estimation import PayloadConfig
@@ -65,6 +66,8 @@ class Config:
     feasibility: FeasibilityLimits = field(default_factory=FeasibilityLimits)
     backend: str = "condensed"
     motor: str = TORQUE_SPEED
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         """Raise ConfigError for an unknown motor."""

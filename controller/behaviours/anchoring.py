@@ -10,11 +10,11 @@ from jaxtyping import Float
 from go2_wbc.curves import Ease
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import MotionPlan
-from go2_wbc.planning.correction import tracked_position
 from go2_wbc.reference import Anchor, Target
 from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.rotations import yaw_rotation
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
+from go2_wbc.tracking.plan_tracking import tracked_position
 
 FARTHEST = 0.02
 """Distance [m] by which a plan is moved at most; more than feet are beside their places after

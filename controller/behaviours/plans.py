@@ -12,15 +12,14 @@ from controller.behaviours.anchoring import Approach, anchor_of
 from controller.behaviours.safe_return import SafeReturn
 from controller.behaviours.weight import FeltWeight
 from go2_wbc.motion_plan import MotionPlan, Posture
-from go2_wbc.planning.correction import tracked_position
 from go2_wbc.reference import Anchor, Reference, Target
-from go2_wbc.robot.joint_friction import JointFriction
 from go2_wbc.robot.model import FOOT_RADIUS
+from go2_wbc.robot.motor import JointFriction
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.tracking.landing import Landings
 from go2_wbc.tracking.plan_feedback import fed_back
-from go2_wbc.tracking.plan_tracking import Deviation, PlanTracker
+from go2_wbc.tracking.plan_tracking import Deviation, PlanTracker, tracked_position
 
 LOW = 0.15
 """Height [m] of the trunk over the ground below which a posture may begin on the belly."""

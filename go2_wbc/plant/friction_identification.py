@@ -26,8 +26,8 @@ from go2_wbc.curves import Curve
 from go2_wbc.errors import PlantError, PlantTimeout
 from go2_wbc.legs import JOINT_NAMES, LEGS
 from go2_wbc.plant.base import Plant
-from go2_wbc.robot.joint_friction import JointFriction
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.motor import JointFriction
 from go2_wbc.robot.state import JointCommand, RobotState
 
 SPEEDS = (0.25, 0.5, 1.0, 1.5)

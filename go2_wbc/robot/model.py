@@ -7,6 +7,7 @@ quantity of the tick, by ``robot.rigid_body`` if the robot's legs turn about the
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
@@ -20,8 +21,7 @@ from go2_wbc.robot.description import RobotDescription, find_description
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.rigid_body import RigidBodies, fill_snapshot
-from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.state import RobotState, Snapshot
 from go2_wbc.world import PAYLOAD_HALF_SIZE, World
 
 FOOT_RADIUS = 0.022
@@ -120,6 +120,8 @@ class RobotModel:
             state: measured.
             payload: what the trunk carries beside what the model has.
         """
+        if not state.q.flags.writeable:  # compiled code takes what it may write to
+            state = replace(state, q=state.q.copy(), v=state.v.copy())
         robot = self._bodies
         if robot is None:
             return self.pinocchio_snapshot(state, payload)

@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.algebra.vectors import (
+from go2_wbc.algebra.linear import (
     Axes,
     about_x,
     about_y,
@@ -36,7 +36,7 @@ from go2_wbc.algebra.vectors import (
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.records import V3, Array4x3, Array12, Array18, Array19, Record
 from go2_wbc.robot.payload import Payload
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 
 Inertia = tuple[float, float, float, float, float, float]
 Body = tuple[float, V3, Inertia]

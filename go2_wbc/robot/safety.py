@@ -17,7 +17,7 @@ import numpy as np
 from go2_wbc.compilation import Foreign, kernel
 from go2_wbc.records import Array4, Array12, Array18, Array19
 from go2_wbc.robot.model import FOOT_RADIUS
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.validation import POSITIVE, ranged
 
 TRUNK_UNDERSIDE = np.array(

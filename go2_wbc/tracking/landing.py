@@ -42,7 +42,7 @@ from go2_wbc.contacts import TIE
 from go2_wbc.records import Record
 from go2_wbc.reference import JOINTS, STANCE, SWING, Anchor, Target
 from go2_wbc.robot.model import FOOT_RADIUS
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.tracking.plan_curves import StanceLoad, set_load
 
 EARLIEST = 0.6

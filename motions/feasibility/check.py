@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.brief import brief, inline_html
 from go2_wbc.errors import CommandError, MotionError
 from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.legs import LEGS
@@ -54,6 +55,9 @@ class CheckedMotion:
     report: FeasibilityReport
     path: Trajectory
     forces: Forces
+
+    _repr_html_ = inline_html
+    __repr__ = brief
 
     def recording(self) -> Recording:
         """The plan in the form of a recorded run, for viewers: 100 samples a second.

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from go2_wbc.brief import brief
 from go2_wbc.errors import CommandError, MotionError, TimelineError
 from motions.feasibility.check import FeasibilityChecker, Playable, timeline_of
 from motions.feasibility.report import FeasibilityReport
@@ -37,6 +38,8 @@ class Suggestion:
     change: float
     motion: Timeline
     report: FeasibilityReport
+
+    __repr__ = brief
 
     def __str__(self) -> str:
         """A line to paste, with what it does."""

@@ -16,7 +16,7 @@ from controller.telemetry import Telemetry
 from go2_wbc.errors import Go2WbcError, ModeError
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import VelocityCommand
-from go2_wbc.planning.pose import BodyPose
+from go2_wbc.planning.trunk import BodyPose
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState

@@ -12,7 +12,7 @@ from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import HeldFoot, MotionPlan, Posture
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.tracking.landing import Landings
 from go2_wbc.tracking.plan_tracking import Deviation
 from tests.controller.plants import StillPlant

@@ -19,7 +19,7 @@ from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rotation_from_rpy
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from motions.batch_kinematics import configurations
 from motions.postures import home_poses
 from tests.engine_helpers import state_of

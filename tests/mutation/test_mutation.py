@@ -6,7 +6,9 @@ import ast
 import json
 from pathlib import Path
 
-from tests.mutation.__main__ import ALIVE, NEAR, ROOT, main, package_mutants
+import pytest
+
+from tests.mutation.__main__ import ALIVE, LIMITS, NEAR, ROOT, TIMEOUT, main, package_mutants
 from tests.mutation.operators import draw, mutants_of
 
 CODE = """
@@ -16,11 +18,18 @@ def add(a, b) -> int:
 
 def is_above(a, b) -> bool:
     return a > b
+
+
+def shrink(a) -> int:
+    while a:
+        a -= 2
+    return a
 """
 TEST = """
-from small.sums import add, is_above
+from small.sums import add, is_above, shrink
 
 def test_sums():
+    assert shrink(2) == 0
     assert add(1, 2) == 3
     assert is_above(2, 1)
 """
@@ -33,7 +42,10 @@ def speak(n: Literal[1], size: int = 2) -> str | None:
 """
 
 
-def test_a_planted_survivor_is_told_and_a_planted_kill_too(tmp_path: Path) -> None:
+def test_a_planted_survivor_is_told_and_a_kill_and_what_never_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(LIMITS, NEAR, 4.0)
     root, out = tmp_path / "root", tmp_path / "out.jsonl"
     for name, text in (("small/sums.py", CODE), ("tests/small/test_sums.py", TEST)):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
@@ -44,6 +56,8 @@ def test_a_planted_survivor_is_told_and_a_planted_kill_too(tmp_path: Path) -> No
     assert {record["mutant"]: record["stage"] for record in found} == {
         "small/sums.py add: a + b -> (a - b)": NEAR,
         "small/sums.py is_above: a > b -> (a >= b)": ALIVE,
+        "small/sums.py shrink: a -= 2 -> a += 2": TIMEOUT,
+        "small/sums.py shrink: 2 -> (3)": TIMEOUT,
     }
     assert (root / "small/sums.py").read_text() == CODE
     assert main([*arguments, "--resume"], root) == 1

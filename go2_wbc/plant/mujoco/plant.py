@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import mujoco
 import numpy as np
@@ -415,6 +415,16 @@ class MujocoPlant(Plant):
     def close(self) -> None:
         """Ends the plant; every later call but ``close`` raises ``ClosedError``."""
         self._closed = True
+
+    def __repr__(self) -> str:
+        """What it is, and when."""
+        now = "closed" if self._closed else f"{self.time:.3f} s"
+        mass = float(self._model.body_subtreemass[self._layout.base])
+        return f"<MujocoPlant: {mass:.2f} kg, {now}>"
+
+    def __reduce__(self) -> NoReturn:
+        """A simulation is no value: it cannot be pickled or copied."""
+        raise TypeError("a MujocoPlant holds a running simulation: make one in each process")
 
     def _check_open(self) -> None:
         if self._closed:

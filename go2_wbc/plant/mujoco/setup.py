@@ -16,7 +16,8 @@ from go2_wbc.plant.mujoco.user_model import load_user_model
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.robot.description import BASE_LINK, find_description
 from go2_wbc.robot.motor import MotorModel, require_motor
-from go2_wbc.validation import FINITE, NOT_NEGATIVE, POSITIVE, ranged
+from go2_wbc.validation import FINITE, NOT_NEGATIVE, POSITIVE, between, ranged
+from go2_wbc.world import RANGES
 
 # Dry rubber on a hard floor; Unitree publishes none. The prototype's runs used it.
 DEFAULT_FRICTION = 0.8
@@ -27,8 +28,7 @@ DEFAULT_FRICTION = 0.8
     NOT_NEGATIVE,
     timestep=POSITIVE,
     control_period=POSITIVE,
-    friction=POSITIVE,
-    mass_scale=POSITIVE,
+    **{name: between(*RANGES[name]) for name in ("friction", "payload", "mass_scale", "delay")},
     initial_yaw=FINITE,
     payload_place=FINITE,
 )

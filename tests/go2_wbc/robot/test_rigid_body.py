@@ -14,8 +14,7 @@ from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.rigid_body import fill_snapshot
-from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.state import RobotState, Snapshot
 from tests.compiled import assert_plain_is_compiled
 from tests.engine_helpers import random_state, state_of
 

@@ -19,7 +19,7 @@ from go2_wbc.robot.safety import (
     heights,
     is_plausible,
 )
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from tests.compiled import assert_plain_is_compiled
 from tests.engine_helpers import random_state, standing_q, state_of
 
