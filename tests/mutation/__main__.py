@@ -23,10 +23,10 @@ EQUIVALENT = Path(__file__).with_name("equivalent.toml")
 LATE = ("test_seeded_faults.py", "test_pytest_plugin.py", "test_*browser.py")
 STAGES = NEAR, PACKAGE, SUITE = "module", "package", "suite"
 ALIVE, TIMEOUT = "alive", "timeout"
-# CPU time [s] after which a mutant hangs: some times what the good code takes, and compiling.
-LIMITS = {NEAR: 90.0, PACKAGE: 600.0, SUITE: 3600.0}
-# The same where nothing is compiled; plain Python may be slow, so no mutant hangs by it.
-PLAIN_LIMIT = 40.0
+PLAIN = "plain"
+# CPU time [s] after which a mutant hangs: some times what the good code takes, and compiling. Plain
+# Python may take longer, so nothing is judged by its time.
+LIMITS = {PLAIN: 40.0, NEAR: 90.0, PACKAGE: 600.0, SUITE: 3600.0}
 
 
 def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
@@ -86,7 +86,7 @@ class Judge:
             *((SUITE, ["tests"], set[str](), marker) for marker in ("not slow", "slow")),
         ]
         if own := [name for name in near if name in own_tests(self._sandbox.home, mutant.path)]:
-            outcome = self._test(mutant, own, self._late, "not slow", PLAIN_LIMIT, plain=True)
+            outcome = self._test(mutant, own, self._late, "not slow", LIMITS[PLAIN], plain=True)
             if not outcome.passed and not outcome.is_late:
                 return NEAR, outcome
         outcome = Outcome(True, "", 0.0)

@@ -14,6 +14,7 @@ from tests.mutation.__main__ import (
     EQUIVALENT,
     LIMITS,
     NEAR,
+    PLAIN,
     ROOT,
     TIMEOUT,
     main,
@@ -32,7 +33,7 @@ def is_above(a, b) -> bool:
 
 def shrink(a) -> int:
     while a:
-        a -= 2
+        a -= a
     return a
 """
 TEST = """
@@ -55,7 +56,8 @@ def speak(n: Literal[1], size: int = 2) -> str | None:
 def test_a_planted_survivor_is_told_and_a_kill_and_what_never_ends(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(LIMITS, NEAR, 4.0)
+    for stage in (NEAR, PLAIN):
+        monkeypatch.setitem(LIMITS, stage, 2.0)
     root, out = tmp_path / "root", tmp_path / "out.jsonl"
     for name, text in (("small/sums.py", CODE), ("tests/small/test_sums.py", TEST)):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
@@ -66,8 +68,7 @@ def test_a_planted_survivor_is_told_and_a_kill_and_what_never_ends(
     assert {record["mutant"]: record["stage"] for record in found} == {
         "small/sums.py add: a + b -> (a - b)": NEAR,
         "small/sums.py is_above: a > b -> (a >= b)": ALIVE,
-        "small/sums.py shrink: a -= 2 -> a += 2": TIMEOUT,
-        "small/sums.py shrink: 2 -> (3)": TIMEOUT,
+        "small/sums.py shrink: a -= a -> a += a": TIMEOUT,
     }
     assert (root / "small/sums.py").read_text() == CODE
     assert main([*arguments, "--resume"], root) == 1
