@@ -29,10 +29,8 @@ from go2_wbc.plant.terrain import Boxes, Slope, Stairs
 from go2_wbc.reference import Reference
 from go2_wbc.robot.estimator import SensorReading, StateEstimator
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.robot.state import JointCommand, RobotState
-from go2_wbc.wbc.controller import WholeBodyController
-from go2_wbc.wbc.solution import WbcSolution
+from go2_wbc.robot.state import JointCommand, RobotState, Snapshot
+from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
 from motions import FeasibilityChecker, FeasibilityReport, Playable, Timeline, motion_names
 
 KEPT_EVERY = 20

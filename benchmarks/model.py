@@ -31,9 +31,8 @@ from go2_wbc.plant.mujoco.model import JointDynamics, build_spec, finish
 from go2_wbc.reference import Reference
 from go2_wbc.robot.description import BASE_LINK, RobotDescription, find_description
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.wbc.controller import WholeBodyController
-from go2_wbc.wbc.solution import WbcSolution
+from go2_wbc.robot.state import Snapshot
+from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
 from motions import compile_timeline, load_motion
 
 STATES = 200

@@ -18,11 +18,9 @@ from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.state import RobotState, Snapshot
 from go2_wbc.wbc.config import WbcConfig
-from go2_wbc.wbc.controller import WholeBodyController
-from go2_wbc.wbc.solution import WbcSolution
+from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
 from motions import compile_motion
 
 ROUNDS = 500  # Ticks of each contact mode that are solved

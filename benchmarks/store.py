@@ -11,7 +11,7 @@ import json
 import math
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from benchmarks.study import Study, TrialResult
@@ -31,7 +31,7 @@ _WORDS = ("failures", "notes", "not_asked")
 
 def settings_header() -> dict[str, str]:
     """What trials depend on besides study and seed; resumed is only what agrees."""
-    settings = hashlib.sha256(repr(Config()).encode()).hexdigest()[:12]
+    settings = hashlib.sha256(repr(asdict(Config())).encode()).hexdigest()[:12]
     return {**identity(ROOT, (*SOURCES, "benchmarks")), "settings": settings}
 
 

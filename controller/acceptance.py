@@ -11,7 +11,7 @@ from controller.checks import ground_height
 from controller.modes import Aborted, Measurements, listed
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.plant import Plant
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.tracking.landing import Landings
 from go2_wbc.tracking.plan_tracking import Deviation
 

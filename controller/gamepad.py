@@ -12,9 +12,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, final
 
+from go2_wbc.extras import install_line
 from go2_wbc.planning.command import VelocityCommand
 
-INSTALL = 'python -m pip install -e ".[gamepad]"'
 DEAD_ZONE = 0.12
 """Share of a stick's way around its middle that counts as none (own choice: worn sticks)."""
 AHEAD, ASIDE, TURNING = 1.0, 0.4, 1.5
@@ -100,7 +100,7 @@ def find_gamepad() -> tuple[Gamepad | None, str]:
     try:
         pygame = importlib.import_module("pygame")
     except ImportError as error:
-        return None, f"no gamepad ({error}); for one: {INSTALL}"
+        return None, f"no gamepad ({error}); for one: {install_line('gamepad')}"
     try:
         pygame.display.init()
         pygame.joystick.init()

@@ -32,11 +32,9 @@ from go2_wbc.robot.motor_watch import MotorWatch
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.payload_estimation import PayloadEstimator
 from go2_wbc.robot.safety import FallDetector, SafetyConfig, is_plausible
-from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.robot.state import Health, JointCommand, RobotState
-from go2_wbc.wbc.controller import WholeBodyController
+from go2_wbc.robot.state import Health, JointCommand, RobotState, Snapshot
+from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
 from go2_wbc.wbc.relaxation import is_grave
-from go2_wbc.wbc.solution import WbcSolution
 
 _log = logging.getLogger(__name__)
 
@@ -94,8 +92,9 @@ class ControlLoop:
         """
         self.plant, self.model, self.wbc, self.telemetry = plant, model, wbc, telemetry
         self._dynamic_wbc = dynamic_wbc or wbc
+        self._is_hardware = plant.is_hardware
         self._safety = safety
-        self._falls = FallDetector(safety)
+        self._falls = FallDetector(safety, model.profile)
         self._sag = self._lean = 0.0
         self.fault: Fault | None = None
         self.warn: Callable[..., None] = _log.warning
@@ -155,7 +154,9 @@ class ControlLoop:
                 as the plant still obeys, and the fault is noted; so for any other exception.
         """
         try:
-            if self._observe() and self.plant.motors_obey:
+            # What a limp robot's joint is asked for changes with its speed, also within a tick.
+            is_limp = isinstance(self.behaviour, Damped)
+            if self._observe() and self.plant.motors_obey and not is_limp:
                 self._motors.update(self._acted, self.state, self.plant.control_period)
             self._look_after_parts()
             self._guard()
@@ -184,7 +185,7 @@ class ControlLoop:
         if is_finite and state.time > self.state.time:
             self._unanswered = 0
             self.state = state
-            self._ahead = state if self.plant.is_hardware else self.latency.ahead(state)
+            self._ahead = state if self._is_hardware else self.latency.ahead(state)
             self.snapshot = self.model.snapshot(self._ahead, self._payload_of(self.behaviour))
             return True
         silence = self._unanswered * self.plant.control_period

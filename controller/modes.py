@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
+from go2_wbc.brief import brief
+
 
 class Mode(Enum):
     """What the robot is doing between calls."""
@@ -50,6 +52,8 @@ class Outcome:
     cancelled: bool = field(default=False, repr=False)
     is_refused: bool = field(default=False, repr=False)
     error: Exception | None = field(default=None, repr=False)
+
+    __repr__ = brief
 
     def __bool__(self) -> bool:
         """Truth of the outcome is ``ok``."""

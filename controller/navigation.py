@@ -18,8 +18,8 @@ APPROACH = 2.0
 """Speed per remaining way [1/s]: the robot slows down before its goal."""
 HEADING_TOLERANCE = math.radians(1.5)
 DISTANCE_TOLERANCE = 0.02
-GREATEST_TURN = 20 * math.pi
-"""Greatest angle [rad] of one goal: ten turns, a minute's work; more is a mistake in units."""
+GREATEST_TURN = 2 * math.pi
+"""Greatest angle [rad] of one goal: a whole turn; more is a mistake in units."""
 GREATEST_DISTANCE = 100.0
 """Greatest distance [m] of one goal: four minutes' work; more is a mistake in units."""
 
@@ -87,7 +87,10 @@ class TurnInPlace(Goal):
     def __init__(self, angle: float) -> None:
         """Turn by ``angle`` [rad], negative turns right; CommandError beyond ``GREATEST_TURN``."""
         if abs(angle) > GREATEST_TURN:
-            raise CommandError(f"angle must be within +-{GREATEST_TURN:.1f} rad, got {angle}")
+            raise CommandError(
+                f"angle of {angle:g} rad looks like degrees: write deg({angle:g}), from motions "
+                f"import deg; a turn goes to 360 deg at most, and this is {math.degrees(angle):.0f}"
+            )
         super().__init__(f"turn by {math.degrees(angle):.1f} deg", angle, TURN_RATE)
 
     def _velocity(self, ahead: float, left: float, turned: float) -> tuple[float, float, float]:

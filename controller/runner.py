@@ -24,7 +24,7 @@ from controller.modes import Aborted, Measurements, listed
 from controller.pacing import Pacer
 from go2_wbc.errors import ClosedError, ModeError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 
 _log = logging.getLogger(__name__)
 

@@ -15,7 +15,7 @@ from go2_wbc.records import Record, layout_of, packed
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import note_peaks
 from go2_wbc.robot.payload import NO_PAYLOAD
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 
 BLOCK = 4096
 """Ticks whose memory is asked for at once, 2.4 MB: numpy wants huge pages for 4 MB and more, and

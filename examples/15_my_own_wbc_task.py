@@ -12,7 +12,7 @@ from controller import GO2Controller
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.reference import Anchor, Reference
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.problem import FORCES, SIZE, Rows
 from go2_wbc.wbc.tasks import Task

@@ -5,6 +5,8 @@ Its public names, each imported when it is first used.
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from go2_wbc.lazy import lazy_exports
@@ -21,11 +23,9 @@ if TYPE_CHECKING:
     from go2_wbc.recording import Recording
     from go2_wbc.reference import JointReference, Reference
     from go2_wbc.robot.model import RobotModel
-    from go2_wbc.robot.snapshot import Snapshot
-    from go2_wbc.robot.state import JointCommand, RobotState
+    from go2_wbc.robot.state import JointCommand, RobotState, Snapshot
     from go2_wbc.wbc.config import WbcConfig
-    from go2_wbc.wbc.controller import WholeBodyController
-    from go2_wbc.wbc.solution import WbcSolution
+    from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
     from go2_wbc.wbc.tasks import Task
     from go2_wbc.world import World
 
@@ -65,6 +65,20 @@ __all__ = [
 __version__: str
 
 _public = lazy_exports(__name__)
+
+
+def _require_not_hidden(*packages: str) -> None:
+    """Raise ImportError if a file of the user's is imported in place of a package of ours."""
+    for name in packages:
+        spec = find_spec(name)
+        if spec and spec.origin and Path(spec.origin).parents[1] != Path(__file__).parents[1]:
+            raise ImportError(
+                f"{spec.origin} hides the package {name!r} of go2-wbc: rename it, "
+                f"for example to my_{name}"
+            )
+
+
+_require_not_hidden("controller", "motions", "viz")
 
 
 def __getattr__(name: str) -> object:

@@ -59,7 +59,6 @@ MODULES = (
     "go2_wbc.plant.mujoco.layout",
     "go2_wbc.reference",
     "go2_wbc.robot.estimator",
-    "go2_wbc.robot.joint_friction",
     "go2_wbc.robot.latency",
     "go2_wbc.robot.leg_kinematics",
     "go2_wbc.robot.motor",
@@ -73,7 +72,6 @@ MODULES = (
     "go2_wbc.tracking.plan_tracking",
     "go2_wbc.wbc.condensed",
     "go2_wbc.wbc.constraints",
-    "go2_wbc.wbc.elimination",
     "go2_wbc.wbc.tasks",
     "go2_wbc.wbc.trajectory_loads",
 )

@@ -14,7 +14,7 @@ from dataclasses import InitVar, dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float
 
-from go2_wbc.compilation import subroutine
+from go2_wbc.brief import brief
 from go2_wbc.errors import CommandError, ConfigError, unknown_name
 from go2_wbc.legs import LEGS
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, Retired, ranged, retires
@@ -72,6 +72,8 @@ class ContactSchedule:
     period: float | None = None
     since: Float[np.ndarray, "n 4"] = field(init=False, repr=False)
     until: Float[np.ndarray, "n 4"] = field(init=False, repr=False)
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         """Check the order of the events and find each foot's changes."""
@@ -148,18 +150,6 @@ class Stride:
                 f"Stride needs stance_min <= stance_max and swing > swing_slope, got {self}"
             )
 
-    def at(self, speed: float) -> tuple[float, float]:
-        """Period [s] and duty at a ``speed`` [m/s]."""
-        return stride_at(self, speed)
-
-
-@subroutine
-def stride_at(c: Stride, speed: float) -> tuple[float, float]:
-    """Period [s] and duty at a ``speed`` [m/s]."""
-    stance = min(max(c.reach / max(speed, TIE), c.stance_min), c.stance_max)
-    period = stance + c.swing + c.swing_slope * (speed - 1.0)
-    return period, stance / period
-
 
 @dataclass(frozen=True, slots=True)
 @retires(needs_mpc=Retired(True, "the forces of every gait are planned ahead"))
@@ -195,6 +185,8 @@ class Gait:
     envelope_share: float = 1.0
     starts_at_once: bool = False
     width: float = 1.0
+
+    __repr__ = brief
 
     def __post_init__(self, needs_mpc: bool) -> None:
         """Raise ConfigError for an apex or offset that is out of range."""

@@ -241,6 +241,7 @@ def _ingredients(function: Any, seen: set[int]) -> Iterator[str]:
     if id(function) in seen:
         return
     seen.add(id(function))
+    yield str(function.__module__)  # kept code names where each part of it comes from
     names: set[str] = set()
     for code in _codes(function.__code__):
         constants = [c for c in code.co_consts if c != function.__doc__ and not _is_code(c)]

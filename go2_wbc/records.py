@@ -33,6 +33,8 @@ from typing import Any, Self, TypeVar, cast
 import numpy as np
 from jaxtyping import AbstractArray, Float
 
+from go2_wbc.brief import cut, told
+
 T = TypeVar("T")
 
 V3 = tuple[float, float, float]
@@ -292,11 +294,5 @@ def _put(row: Float[np.ndarray, " size"], field: Field, value: Any, where: str) 
 
 
 def _described(view: Any, layout: Layout) -> str:
-    said = (f"{name}={_said(getattr(view, name))}" for name in layout.fields)
-    return f"{type(view).__name__}({', '.join(said)})"
-
-
-def _said(part: Any) -> str:
-    if isinstance(part, np.ndarray):
-        return str(part.tolist()) if part.size <= 12 else f"<{part.shape}>"
-    return repr(float(part) if isinstance(part, np.floating) else part)
+    said = (f"{name}={told(getattr(view, name))}" for name in layout.fields)
+    return cut(f"{type(view).__name__}({', '.join(said)})")

@@ -15,12 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.brief import brief
 from go2_wbc.compilation import kernel
 from go2_wbc.errors import CommandError
 from go2_wbc.lazy import moved_names
 from go2_wbc.records import Array4, Record
 from go2_wbc.robot.rotations import yaw_rotation
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 
 LEAST_WEIGHT, MOST_WEIGHT = 1e-6, 1e2
 """Of the force regularisation: beyond them accuracy is lost."""
@@ -188,6 +189,8 @@ class Reference:
     stance: Bool[np.ndarray, "4"] = field(init=False)
     _row: Float[np.ndarray, " size"] | None = field(init=False, repr=False, default=None)
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         """Find the feet in stance."""
         stance = np.array([task is LegTask.STANCE for task in self.legs])
@@ -308,6 +311,8 @@ class JointReference:
     v_joints: Float[np.ndarray, "12"]
     kp: float
     kd: float
+
+    __repr__ = brief
 
     @property
     def stance(self) -> Bool[np.ndarray, "4"]:

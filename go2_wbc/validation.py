@@ -20,7 +20,6 @@ import warnings
 from collections.abc import Callable
 from dataclasses import InitVar, dataclass
 from numbers import Real
-from types import ModuleType
 from typing import Any, TypeGuard, TypeVar
 
 from go2_wbc.errors import ConfigError
@@ -89,11 +88,10 @@ class Retired:
     instead: str
 
 
-def past_table(module: ModuleType, *names: str) -> object:
-    """A retired table of a file: its keys, and the constants of ``module`` that they are now."""
-    keys = {name: getattr(module, name.upper()) for name in names}
+def past_table(table: str, **keys: float) -> object:
+    """A retired ``table`` of a file: its keys, and the constants that they are now."""
     kinds = [(name, type(value), value) for name, value in keys.items()]
-    return dataclasses.make_dataclass(module.__name__, kinds, frozen=True)()
+    return dataclasses.make_dataclass(table, kinds, frozen=True)()
 
 
 def retires(**names: object) -> Callable[[_Class], _Class]:
@@ -142,9 +140,14 @@ def require(config: object, rule: Rule, *names: str) -> None:
                 )
 
 
-def is_finite_number(value: object) -> TypeGuard[Real]:
-    """Whether ``value`` is a finite number; True and False are none."""
-    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+def is_finite_number(value: object) -> TypeGuard[float]:
+    """Whether ``value`` is a number that a float can hold, and finite; True and False are none."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer beyond every float
+        return False
 
 
 def warn_retired(name: str, instead: str) -> None:

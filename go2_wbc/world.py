@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from go2_wbc.brief import brief
 from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.validation import between, ranged, require
 
@@ -15,7 +16,7 @@ PAYLOAD_HALF_SIZE = (0.10, 0.06, 0.04)
 """Of the payload [m]: a solid box of about a battery's or computer's size."""
 
 
-_RANGES = {
+RANGES = {
     "friction": (0.0001, 2.0),
     "friction_uncertainty": (0.0, 0.9),
     "payload": (0.0, 12.0),
@@ -28,7 +29,7 @@ _RANGES = {
 
 
 @dataclass(frozen=True, slots=True)
-@ranged(**{name: between(*bounds) for name, bounds in _RANGES.items()})
+@ranged(**{name: between(*bounds) for name, bounds in RANGES.items()})
 class World:
     """What a check counts on, and what a simulated robot meets.
 
@@ -63,6 +64,8 @@ class World:
     delay: float = 0.0
     sensors: str = "ideal"
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         """Raise ConfigError for a value that is out of range."""
         if not isinstance(self.payload_place, tuple) or len(self.payload_place) != 3:
@@ -93,7 +96,7 @@ class World:
         values = {}
         for (name, part), share in zip(_UNCERTAIN.items(), shares, strict=True):
             shifted = getattr(self, name) * (1.0 + share * getattr(self, f"{part}_uncertainty"))
-            low, high = _RANGES[name]
+            low, high = RANGES[name]
             values[name] = min(max(shifted, low), high)
         return replace(
             self, **values, **{f"{part}_uncertainty": 0.0 for part in _UNCERTAIN.values()}

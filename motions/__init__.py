@@ -10,17 +10,15 @@ if TYPE_CHECKING:
     from go2_wbc.motion_plan import Posture
     from motions.authoring import Choice, Motion, Range, motion
     from motions.dynamics.phases import Tolerance
-    from motions.feasibility import (
+    from motions.feasibility.check import (
         CheckedMotion,
         FeasibilityChecker,
-        FeasibilityReport,
-        Finding,
         Playable,
-        Suggestion,
         check,
         compile_motion,
-        suggest,
     )
+    from motions.feasibility.report import FeasibilityReport, Finding
+    from motions.feasibility.suggestions import Suggestion, suggest
     from motions.language.timeline import Timeline, deg
     from motions.music.beat_tracking import Beats, beats
     from motions.plan.compiled_plan import CompiledPlan

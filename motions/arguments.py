@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from enum import Enum
-from numbers import Real
 from typing import TypeVar
 
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
+from go2_wbc.validation import is_finite_number as is_number
 
 FARTHEST = 1.5
 """A place farther away than this [m] is a mistake in units: a stretched leg is 0.45 m long. What is
@@ -26,13 +26,6 @@ Who walks may turn twice.
 """
 
 _Meaning = TypeVar("_Meaning", bound=Enum)
-
-
-def is_number(value: object) -> bool:
-    """Whether it is a finite real number, and no truth value."""
-    if isinstance(value, bool) or not isinstance(value, Real):
-        return False
-    return math.isfinite(float(value))
 
 
 def positive(name: str, value: float) -> float:

@@ -9,13 +9,17 @@ A parameter's annotation says which values are valid, its default what is taken 
 
 from __future__ import annotations
 
+import importlib
 import inspect
+import pickle
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
+from go2_wbc.brief import cut
 from go2_wbc.errors import CommandError, TimelineError, unknown_name
 from motions.arguments import is_number
 from motions.language.timeline import Timeline
@@ -119,6 +123,24 @@ class Motion:
     source: str
     _make: Callable[..., Timeline]
 
+    def __repr__(self) -> str:
+        """Its name and parameters."""
+        return cut(f"Motion({', '.join([repr(self.name), *map(str, self.parameters)])})")
+
+    def __reduce__(self) -> tuple[Callable[..., Motion], tuple[str, str]]:
+        """By its module and name, as functions are: what a process pool needs."""
+        names = (self._make.__module__, self._make.__qualname__)
+        try:
+            is_found = _motion_named(*names) == self
+        except (ImportError, AttributeError):
+            is_found = False
+        if not is_found:
+            raise pickle.PicklingError(
+                f"motion {self.name!r} is not found as {names[1]} in module {names[0]}: pickle "
+                "motions of files that can be imported, or the Timeline that they make"
+            )
+        return _motion_named, names
+
     def __call__(self, **values: Value) -> Timeline:
         """The timeline for these parameters.
 
@@ -147,6 +169,11 @@ class Motion:
         where = f"{self.name} ({Path(file).name}, line {last_line(error, file) or first})"
         what = "" if isinstance(error, TimelineError) else f"{type(error).__name__}: "
         return f"{where}: {what}{error}"
+
+
+def _motion_named(module: str, name: str) -> Motion:
+    found: Motion = attrgetter(name)(importlib.import_module(module))
+    return found
 
 
 def last_line(error: Exception, file: str) -> int | None:

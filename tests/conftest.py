@@ -48,6 +48,7 @@ UNCHECKED = frozenset(
         "motions.pytest_plugin",
         "go2_wbc.contacts",
         "go2_wbc.curves",
+        "go2_wbc.brief",
         "go2_wbc.compilation",  # loaded here, as is what it imports
         "go2_wbc.kept_code",
         "go2_wbc.machine_code",
@@ -57,7 +58,7 @@ UNCHECKED = frozenset(
         "go2_wbc.lazy",  # loaded by the pytest plugin's package
         "go2_wbc.planning.swing",
         "go2_wbc.robot.rotations",
-        "go2_wbc.robot.snapshot",
+        "go2_wbc.robot.state",
     }
 )
 IS_CHECKING = os.environ.get("GO2_WBC_TYPECHECK", "1") != "0"

@@ -6,6 +6,7 @@
 set -euo pipefail
 python=$(realpath --no-symlinks "$1")
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
+here=$PWD
 unset PYTHONPATH
 export PIP_DISABLE_PIP_VERSION_CHECK=1
 
@@ -47,6 +48,18 @@ assert not strangers, f'the wheel carries {strangers}'
 test -s out/demo/demo.html
 "$bin/high_five_demo" --no-media >/dev/null
 "$bin/go2-wbc" check wave >/dev/null
+
+echo "== tutorial, README and guides, as written"
+(cd "$here" && GO2_WBC_USERS_BIN="$bin" "$python" -m pytest -n 2 -q tests/test_docs.py \
+    -k "tutorial or runs_alone")
+
+echo "== a user's script under strict type checkers: of the wheel, and of the checkout"
+cp "$here/tests/user_script.py" .
+echo '{"typeCheckingMode": "strict"}' >pyrightconfig.json
+for environment in "$bin/python" "$python"; do
+    "$python" -m mypy --strict --python-executable "$environment" user_script.py
+    "$python" -m pyright --pythonpath "$environment" user_script.py
+done
 
 echo "== the sdist"
 "$bin/pip" uninstall --quiet --yes go2-wbc

@@ -14,10 +14,8 @@ from go2_wbc.reference import BodyTarget, LegTask, Reference, TrackedPoint
 from go2_wbc.robot.estimator import SensorReading
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rotation_from_rpy
-from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.robot.state import RobotState
-from go2_wbc.wbc.controller import WholeBodyController
-from go2_wbc.wbc.solution import WbcSolution
+from go2_wbc.robot.state import RobotState, Snapshot
+from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
 
 Legs = tuple[LegTask, ...]
 ST, SW, JO = LegTask.STANCE, LegTask.SWING, LegTask.JOINTS

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from go2_wbc.brief import brief
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
 
@@ -40,6 +41,8 @@ class MarginCurve:
     subjects: tuple[str, ...]
     worst: Int[np.ndarray, " n"]
     tight: float | int = 0.0
+
+    __repr__ = brief
 
     @property
     def least(self) -> float:
@@ -140,6 +143,8 @@ class Verdict:
     world: str = ""
     certified: CertifiedRate | None = None
 
+    __repr__ = brief
+
     def ranked(self) -> tuple[MarginCurve, ...]:
         """The curves: broken ones first, then the tight ones, then the others as they come."""
         return tuple(sorted(self.curves, key=lambda c: (not c.is_broken, c.least >= c.tight)))
@@ -194,6 +199,8 @@ class ReplayContent:
     sliders: tuple[Slider, ...] = ()
     sound: bytes = b""
     end_pose: tuple[float, float, float] | None = None
+
+    __repr__ = brief
 
 
 def checked_content(shown: Recording | ReplayContent) -> ReplayContent:

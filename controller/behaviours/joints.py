@@ -8,7 +8,7 @@ from jaxtyping import Float
 from controller.behaviours import Behaviour
 from go2_wbc.curves import Curve
 from go2_wbc.reference import JointReference
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 
 DAMPING = 3.0
 """Joint damping [N m s/rad] of the safe state: the robot sinks in about a second."""

@@ -31,12 +31,12 @@ from go2_wbc.geometry import support_margin
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
+from go2_wbc.planning.ground import MOST_FRICTION
 from go2_wbc.planning.locomotion import LEAST_HEIGHT, LocomotionConfig
-from go2_wbc.planning.slip import MOST
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 
 LEAST_MARGIN = 0.03
 """Distance [m] of the capture point inside the edge of the support polygon below which the robot
@@ -104,7 +104,7 @@ class Standing(ChangePosture):
             mpc=mpc,
         )
         is_slippery = friction is not None and friction < config.ground_friction
-        self._friction_of_steps = friction if is_slippery else MOST
+        self._friction_of_steps = friction if is_slippery else MOST_FRICTION
         self._steps: Walking | None = None
 
     @property

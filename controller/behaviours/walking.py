@@ -10,11 +10,10 @@ from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnve
 from go2_wbc.planning.envelopes import DWELL, GaitChoice
 from go2_wbc.planning.gait_clock import time_between
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
-from go2_wbc.planning.pose import LEVEL, BodyPose
-from go2_wbc.planning.trunk import SETTLED_COMMAND
+from go2_wbc.planning.trunk import LEVEL, SETTLED_COMMAND, BodyPose
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 
 
 class Walking(Behaviour):

@@ -14,8 +14,8 @@ import numpy as np
 
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import STANCE, Target
-from go2_wbc.robot.joint_friction import JointFriction
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.motor import JointFriction
+from go2_wbc.robot.state import Snapshot
 from motions.dynamics.phases import GRAVITY
 
 LEAST, MOST = 0.8, 1.4

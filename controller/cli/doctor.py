@@ -32,6 +32,8 @@ from packaging.specifiers import SpecifierSet
 
 from controller.cli.common import PROGRAM, ExitCode, installed_version, print_json
 from go2_wbc.errors import DescriptionError
+from go2_wbc.extras import EXTRAS
+from go2_wbc.extras import install_line as extra_line
 
 WIDTH = 80
 OLDEST_PYTHON, NEWEST_PYTHON = (3, 11), (3, 13)
@@ -56,12 +58,6 @@ ROS2: Mapping[str, str] = {
 """What ``go2-wbc ros2`` uses, and the module that each brings; those of ``BUILT`` are built."""
 BUILT = ("quadropted-msgs", "tf2-msgs")
 BUILD_LINE = "ros2/build_interfaces.sh {python} dist && {pip} dist/*.whl"
-EXTRAS: Mapping[str, tuple[str, str, str]] = {
-    "music": ("librosa", ">=0.11,<0.12", "the beats of a song: dance"),
-    "gamepad": ("pygame-ce", ">=2.5,<3", "a gamepad for teleop"),
-    "unitree": ("cyclonedds", "==11.0.1", "Unitree's protocol: unitree-sim, unitree-drive"),
-}
-"""What an optional extra brings: a package, its version, and what it is for."""
 NEEDED_SOLVERS: Mapping[str, str] = {"daqp": "daqp", "proxqp": "proxsuite", "quadprog": "quadprog"}
 """The QP solvers that the project uses, and the package that brings each."""
 
@@ -150,7 +146,10 @@ def examine() -> list[Finding]:
     findings += judge_pairing(placo, pin, pairing, bounds.get("placo", ""))
     findings += judge_robot_files(bounds.get("example-robot-data", ""))
     findings += judge_solvers(probes.get("qpsolvers", ImportProbe()).solvers, bounds)
-    findings += [judge_extra(name, installed_version(EXTRAS[name][0])) for name in EXTRAS]
+    for name in EXTRAS:
+        asked = requirements_of(PROGRAM, name)
+        here = {package: installed_version(package) for package in asked}
+        findings.append(judge_extra(name, asked, here))
     findings.append(judge_display(sys.platform, os.environ))
     return findings + judge_ros2(versions, probes)
 
@@ -159,7 +158,7 @@ def judge_ros2(
     versions: Mapping[str, str | None], probes: Mapping[str, ImportProbe]
 ) -> list[Finding]:
     """Whether ``go2-wbc ros2`` can run; it is optional, so that nothing here is a problem."""
-    section, install = "ROS 2 (optional)", f'{_pip()} -e ".[ros2]"'
+    section, install = "ROS 2 (optional)", extra_line("ros2", _python())
     if versions["ros-rclpy"] is None:
         detail = "not installed: go2-wbc ros2 and high_five_demo --ros2 need it"
         return [Finding(section, "extra [ros2]", Status.NOTE, detail, install)]
@@ -262,14 +261,22 @@ def judge_solvers(available: tuple[str, ...], bounds: Mapping[str, str]) -> list
     return found
 
 
-def judge_extra(name: str, version: str | None) -> Finding:
-    """Whether the package of an optional extra is there; nothing else needs it."""
-    package, bounds, purpose = EXTRAS[name]
-    if version is not None and satisfies(version, bounds):
-        return Finding("Extras", name, Status.OK, f"{package} {version}")
-    found = "not installed" if version is None else f"{package} {version} does not fit {bounds}"
-    line = install_line(package, bounds)
-    return Finding("Extras", name, Status.NOTE, f"{found}; for {purpose}", line)
+def judge_extra(
+    name: str, bounds: Mapping[str, str], versions: Mapping[str, str | None]
+) -> Finding:
+    """Whether the packages of an optional extra are there; nothing else needs them."""
+    purpose, lacking = EXTRAS[name], list[str]()
+    for package, wanted in bounds.items():
+        version = versions[package]
+        if version is None:
+            lacking.append(f"{package} is not installed")
+        elif not satisfies(version, wanted):
+            lacking.append(f"{package} {version} does not fit {wanted}")
+    if not lacking:
+        return Finding("Extras", name, Status.OK, purpose)
+    more = f" and {len(lacking) - 1} more" if len(lacking) > 1 else ""
+    line = extra_line(name, _python())
+    return Finding("Extras", name, Status.NOTE, f"{purpose}; {lacking[0]}{more}", line)
 
 
 def judge_display(system: str, environment: Mapping[str, str]) -> Finding:
@@ -360,8 +367,8 @@ def _probe(module: str) -> ImportProbe:
     return ImportProbe(file=answer["file"], solvers=tuple(answer["solvers"]))
 
 
-def requirements_of(distribution: str) -> Mapping[str, str]:
-    """Version bounds that a package puts on its dependencies, by name, without its extras.
+def requirements_of(distribution: str, extra: str = "") -> Mapping[str, str]:
+    """Version bounds that a package puts on its dependencies by name, or on those of an extra.
 
     Empty for a package that is not installed, if it is not this one.
     """
@@ -371,18 +378,29 @@ def requirements_of(distribution: str) -> Mapping[str, str]:
         here = Path(__file__).parents[2] / "pyproject.toml"
         if distribution != PROGRAM or not here.is_file():
             return {}
-        rows = tomllib.loads(here.read_text(encoding="utf-8"))["project"]["dependencies"]
-    return parse_requirements(rows)
+        project = tomllib.loads(here.read_text(encoding="utf-8"))["project"]
+        rows = project["optional-dependencies"][extra] if extra else project["dependencies"]
+        return parse_requirements(rows)
+    return parse_requirements(rows, extra)
 
 
-def parse_requirements(rows: Iterable[str]) -> dict[str, str]:
-    """``["placo<0.11,>=0.10.2", ...]`` as ``{"placo": "<0.11,>=0.10.2", ...}``, without extras."""
+def parse_requirements(rows: Iterable[str], extra: str = "") -> dict[str, str]:
+    """``["placo<0.11,>=0.10.2", ...]`` as ``{"placo": "<0.11,>=0.10.2", ...}``.
+
+    Args:
+        rows: as a package's metadata has them.
+        extra: to have those that it alone asks for; by default what every installation needs.
+    """
     found = [Requirement(row) for row in rows]
     return {
         item.name: str(item.specifier)
         for item in found
-        if item.marker is None or item.marker.evaluate({"extra": ""})
+        if _is_asked(item, extra) and not (extra and _is_asked(item, ""))
     }
+
+
+def _is_asked(item: Requirement, extra: str) -> bool:
+    return item.marker is None or item.marker.evaluate({"extra": extra})
 
 
 def satisfies(version: str, bounds: str) -> bool:

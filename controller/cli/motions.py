@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import keyword
+import sys
 import textwrap
 from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,11 +22,12 @@ from controller.cli.motion_args import (
     MotionWord,
     Payload,
     Settings,
+    checker_of,
     meant,
     print_verdict,
     the_motion,
 )
-from controller.cli.options import Json, output
+from controller.cli.options import Json, Numbers, output
 from controller.cli.progress import ProgressLine
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.files import checked_output, write_atomically
@@ -113,6 +116,8 @@ def new(
     """
     if not name.isidentifier() or keyword.iskeyword(name):
         raise CommandError(f"NAME must be a Python name such as my_motion, got {name!r}")
+    if name in sys.stdlib_module_names or find_spec(name) is not None:
+        raise CommandError(f"{name}.py would hide the module {name!r}: choose another name")
     shown = out / f"{name}.py"
     target = checked_output(shown, [".py"])
     if target.exists():
@@ -136,6 +141,7 @@ def check(
     fix: Annotated[bool, "look for the least change that makes a refused motion feasible"] = False,
     friction: Friction = None,
     payload: Payload = None,
+    config: Numbers = None,
     json: Json = False,
 ) -> int:
     """Check motions: can the robot do them? Nothing is simulated.
@@ -152,15 +158,16 @@ def check(
         go2-wbc check my_motion.py --fix  what would make it feasible
         go2-wbc check bow --json          the same for a program to read
     """
+    from controller.arguments import config as read_config
     from go2_wbc.world import World
-    from motions import FeasibilityChecker, suggest
+    from motions import suggest
 
     lines = meant(motion, set)
     reports: list[FeasibilityReport] = []
     changes: dict[str, Sequence[Suggestion]] = {}
     with ProgressLine(is_quiet=json) as progress:
         world = World.of(friction, payload)
-        checker = FeasibilityChecker(world=world, progress=progress.solving)
+        checker = checker_of(read_config(config), world, progress)
         for number, line in enumerate(lines):
             progress.update(number / len(lines), line.name)
             reports.append(checker.check(line))

@@ -21,6 +21,7 @@ from controller.sweeps.rows import SEED, Row
 from controller.sweeps.run import Progress, SweepResult, read_sweep, sweep
 from controller.sweeps.summary import CONFIDENCE, finite, rate_interval
 from controller.sweeps.targets import motion_target
+from go2_wbc.brief import brief
 from go2_wbc.errors import CommandError
 from go2_wbc.world import World
 
@@ -58,6 +59,8 @@ class Certificate:
     worst: tuple[Row, ...]
     about: Mapping[str, str]
     path: Path
+
+    __repr__ = brief
 
     @property
     def rate(self) -> float:

@@ -10,10 +10,10 @@ from typing import Any
 from controller.sweeps.rows import SEED
 from controller.sweeps.run import SweepResult
 from go2_wbc.errors import MissingDependency
+from go2_wbc.extras import install_line
 from go2_wbc.files import checked_output, write_atomically
 
 EXPORT_SUFFIXES = (".csv", ".parquet")
-INSTALL_LINE = 'pip install "go2-wbc[sweep]"'
 
 
 def export_rows(result: SweepResult, path: Path | str) -> Path:
@@ -67,5 +67,6 @@ def _pyarrow() -> tuple[Any, Any]:
         import pyarrow
         from pyarrow import parquet
     except ImportError as error:
-        raise MissingDependency(f"Parquet needs pyarrow ({error}): {INSTALL_LINE}") from error
+        line = install_line("sweep")
+        raise MissingDependency(f"Parquet needs pyarrow ({error}): {line}") from error
     return pyarrow, parquet

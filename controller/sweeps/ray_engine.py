@@ -16,6 +16,7 @@ from controller.sweeps.engine import ONE_THREAD, Ends, Engine, Item, Trials
 from controller.sweeps.local import processors
 from controller.sweeps.worker import answer, order_of
 from go2_wbc.errors import MissingDependency, SweepError
+from go2_wbc.extras import install_line
 
 ATTEMPTS = 4
 """How often an item is tried whose process or machine dies: it takes a moment until a machine is
@@ -29,7 +30,6 @@ PATIENCE = 10.0
 ON_LOOPBACK = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
 """Ray on this machine only listens on 127.0.0.1, as it does elsewhere than on Linux by default. Its
 argument for the address does not: it replaces 127.0.0.1 by one that others reach."""
-INSTALL_LINE = 'pip install "go2-wbc[cluster]"'
 
 
 @final
@@ -127,5 +127,5 @@ def _ray(settings: Mapping[str, str]) -> Any:  # noqa: ANN401 - a module of an e
         import ray
         import ray.exceptions
     except ImportError as error:
-        raise MissingDependency(f"Ray is not here ({error}): {INSTALL_LINE}") from error
+        raise MissingDependency(f"Ray is not here ({error}): {install_line('cluster')}") from error
     return ray

@@ -14,7 +14,7 @@ from go2_wbc.compilation import subroutine
 from go2_wbc.planning.ground import ground_at
 from go2_wbc.planning.trunk import heading, world_velocity
 from go2_wbc.planning.walk import Planner, Walk
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 
 _TINY = 1e-9
 """Length [m] that stands in for zero where one divides by it."""

@@ -16,19 +16,17 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.algebra.active_set import SOLVED
-from go2_wbc.algebra.linear import solve_linear
-from go2_wbc.algebra.vectors import cross, plus, triple
+from go2_wbc.algebra.linear import cross, plus, solve_linear, triple
 from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
 from go2_wbc.planning.footholds import foothold, nominal_feet
 from go2_wbc.planning.gait_clock import Clock
 from go2_wbc.planning.ground import ground_at, tilt
 from go2_wbc.planning.mpc import INTERVAL, NODES, STEP, Horizon, solve_mpc
-from go2_wbc.planning.pose import advance_pose, pose_turn
-from go2_wbc.planning.trunk import Command, ramp
+from go2_wbc.planning.trunk import Command, advance_pose, pose_turn, ramp
 from go2_wbc.planning.walk import Planner, Walk
 from go2_wbc.reference import STANCE, Target
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 
 
 @subroutine

@@ -23,7 +23,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.compilation import subroutine
-from go2_wbc.contacts import GAITS, TIE, Gait, Stride, stride_at
+from go2_wbc.contacts import GAITS, TIE, Gait, Stride
 from go2_wbc.records import Record
 
 PERIOD_RATE, DUTY_RATE, OFFSET_RATE = 0.2, 0.5, 0.8
@@ -163,6 +163,14 @@ def align(clock: Clock, goal: Float[np.ndarray, "4"]) -> None:
 def differ(a: Float[np.ndarray, "4"], b: Float[np.ndarray, "4"]) -> bool:
     """Whether any number does."""
     return a[0] != b[0] or a[1] != b[1] or a[2] != b[2] or a[3] != b[3]
+
+
+@subroutine
+def stride_at(c: Stride, speed: float) -> tuple[float, float]:
+    """Period [s] and duty at a ``speed`` [m/s]."""
+    stance = min(max(c.reach / max(speed, TIE), c.stance_min), c.stance_max)
+    period = stance + c.swing + c.swing_slope * (speed - 1.0)
+    return period, stance / period
 
 
 @subroutine

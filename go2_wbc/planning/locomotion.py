@@ -19,19 +19,21 @@ from jaxtyping import Bool, Float
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.contacts import TIE, Gait
 from go2_wbc.planning.command import VelocityCommand
-from go2_wbc.planning.contact import FootContact, follow_contact, loaded_time
 from go2_wbc.planning.footholds import foothold, nominal_feet
 from go2_wbc.planning.force_mpc import apply_force_plan
 from go2_wbc.planning.gait_clock import adapt, foot_phase, restart
 from go2_wbc.planning.ground import (
+    LEAST_FRICTION,
+    MOST_FRICTION,
+    Slip,
     carry_ground,
     ground_at,
     ground_below,
     learn_ground,
     level_friction,
     note_stumble,
+    observe_slip,
 )
-from go2_wbc.planning.pose import LEVEL, BodyPose, advance_pose
 from go2_wbc.planning.rest import (
     come_to_rest,
     is_square,
@@ -41,11 +43,21 @@ from go2_wbc.planning.rest import (
     start_stepping,
     why_not_resting,
 )
-from go2_wbc.planning.slip import LEAST, MOST, Slip, observe_slip
-from go2_wbc.planning.swing import Swing, begin_swing, resume_swing, swing_foot
+from go2_wbc.planning.swing import (
+    FootContact,
+    Swing,
+    begin_swing,
+    follow_contact,
+    loaded_time,
+    resume_swing,
+    swing_foot,
+)
 from go2_wbc.planning.trunk import (
+    LEVEL,
+    BodyPose,
     Command,
     Trunk,
+    advance_pose,
     correct_height,
     fill_body,
     follow_heading,
@@ -68,7 +80,7 @@ from go2_wbc.planning.walk import (
 from go2_wbc.records import packed
 from go2_wbc.reference import STANCE, SWING, Reference, Target
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 
 __all__ = ["GREATEST_HEIGHT", "LEAST_HEIGHT", "LocomotionConfig", "LocomotionPlanner"]
 
@@ -213,7 +225,7 @@ def plan(
         stands[leg] = follow_contact(foot, above, contact[leg], stance[leg], progress[leg], dt)
     observe_slip(s.slip, now, contact, tau, stands, s.is_stepping, dt)
     note_liftoffs(now, s, c, contact, stance, progress)
-    target.friction = level_friction(s.ground, s.slip.friction, LEAST)
+    target.friction = level_friction(s.ground, s.slip.friction, LEAST_FRICTION)
     fill_body(s.trunk, s.ground, c.height, target)
     level(s.trunk, now, contact, s.is_stepping, dt, target)
     fill_feet(now, s, c, stance, stands, elapsed, remaining, target)
@@ -251,7 +263,7 @@ class LocomotionPlanner:
             trunk=Trunk(yaw=snapshot.state.yaw, position=snapshot.p_world_com[:2]),
             rest=Rest(place=snapshot.p_world_com[:2], middle=snapshot.p_world_feet.mean(axis=0)),
             ground=ground_below(snapshot, self._model.foot_radius),
-            slip=Slip(friction=min(known, MOST)),
+            slip=Slip(friction=min(known, MOST_FRICTION)),
             feet=feet,
             planned=PlannedForces(next=-np.inf),
         )

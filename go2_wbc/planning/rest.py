@@ -25,7 +25,7 @@ from go2_wbc.planning.footholds import nominal_feet
 from go2_wbc.planning.gait_clock import foot_phase, restart
 from go2_wbc.planning.trunk import follow_position, is_settled
 from go2_wbc.planning.walk import Planner, Walk
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 
 PATIENCE = 4
 """Landings without a command that may bring the feet below their hips; each takes 0.18 s."""

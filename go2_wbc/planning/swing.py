@@ -1,4 +1,4 @@
-"""Swing foot curves: from lift-off over an apex to a touchdown that may still move.
+"""A foot's swing: from lift-off over an apex to a touchdown that may still move, to its contact.
 
 With the share ``u`` of a span of ``T`` seconds and the ease ``s(u) = 3 u^2 - 2 u^3``, a coordinate
 goes from ``a`` to ``b`` as ``p = a + s (b - a)``; so ``v = s' (b - a) / T`` and
@@ -10,6 +10,18 @@ learnt of the ground meanwhile is for the next swing: a curve that was changed o
 5 cm, and feet that swung beside the one that had stumbled came down too early, too far back. A foot
 that is stopped in the middle of its swing begins another one where it is, in the time that is left:
 it rises along what it has met before it goes on.
+
+Those feet of a gait stand that shall, and those that have found a step before they do. A foot that
+meets something above the ground, late in its swing, stands from then on. If it went on towards its
+place it would push against the step. On ground as expected it stands when it is planned to, so that
+a trot on the level is as exact as its clock.
+
+A foot that is late stands too, from when it is planned to. Its leg carries its share of the force,
+which puts it down within milliseconds. To let it swing down instead until it is met, at 0.4 to
+1.5 m/s, made the trot fall in 4 of 6 runs over boxes of 12 cm and up stairs of 10 cm, which it
+walked in 6 and 5 without (own simulation).
+
+``tracking.landing`` does the like for motions.
 """
 
 from __future__ import annotations
@@ -19,14 +31,61 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from go2_wbc.compilation import subroutine
+from go2_wbc.contacts import TIE
 from go2_wbc.planning.gait_clock import Clock
 from go2_wbc.planning.ground import Ground, apex_raise, delay
 from go2_wbc.records import Array3, Record
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
-TIE = 1e-9
-"""Progress this near to the middle counts as the middle, where the acceleration changes its sign:
-a gait passes through it in whole ticks, and rounding must not decide."""
+EARLIEST = 0.7
+"""Share of the swing from which on a contact may be a landing."""
+STEP = 0.015
+"""Height [m] above the ground from which on it is one. Both are from a search in simulation."""
+
+
+class FootContact(Record):
+    """What is known of a foot's contact.
+
+    Attributes:
+        is_early: whether it stands ahead of its plan.
+        since: for how long [s] it has done so; infinite if it has come down when it was planned to.
+        was_stance: whether it was planned to stand at the tick before.
+        is_awaited: whether it shall stand and has not met the ground yet.
+    """
+
+    is_early: bool
+    since: float
+    was_stance: bool
+    is_awaited: bool
+
+
+@subroutine
+def follow_contact(
+    foot: FootContact, above: float, touches: bool, planned: bool, progress: float, dt: float
+) -> bool:
+    """Bring a foot to this tick, ``dt`` seconds after the last; returns whether it stands.
+
+    Args:
+        above: height [m] of the foot above the ground as it is known.
+        touches: whether a contact is measured.
+        planned: whether it shall stand.
+        progress: share of its swing that has passed.
+    """
+    if planned:
+        foot.is_early = False
+    elif not foot.is_early:
+        foot.since = np.inf
+        if touches and above > STEP and progress >= EARLIEST - TIE:
+            foot.is_early, foot.since = True, 0.0
+    foot.since += dt
+    return planned or foot.is_early
+
+
+@subroutine
+def loaded_time(foot: FootContact, planned: bool, elapsed: float, remaining: float) -> float:
+    """Time [s] to the nearest change of a standing foot's contact, since when it came down."""
+    begun = foot.since if foot.since < np.inf else elapsed
+    return min(begun, remaining) if planned else begun
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +191,7 @@ def swing_foot(
         p[i] = start[i] + x * delta
         v[i] = dx / span * delta
         a[i] = ddx / span**2 * delta
+    # a gait passes the middle in whole ticks, where the acceleration changes its sign
     apex = max(start[2], goal[2]) + share * (c.apex + swing.raised)
     is_rising = progress < 0.5 - TIE
     way = np.hypot(goal[0] - start[0], goal[1] - start[1])

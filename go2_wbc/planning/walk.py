@@ -9,15 +9,12 @@ from jaxtyping import Float
 
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ConfigError
-from go2_wbc.planning import contact, ground, slip
-from go2_wbc.planning.contact import FootContact
+from go2_wbc.planning import ground, swing
 from go2_wbc.planning.gait_clock import Cadence, Clock
-from go2_wbc.planning.ground import Ground
+from go2_wbc.planning.ground import Ground, Slip
 from go2_wbc.planning.mpc import Horizon, MpcConfig
-from go2_wbc.planning.pose import PoseConfig
-from go2_wbc.planning.slip import Slip
-from go2_wbc.planning.swing import Swing, SwingConfig
-from go2_wbc.planning.trunk import Trunk
+from go2_wbc.planning.swing import FootContact, Swing, SwingConfig
+from go2_wbc.planning.trunk import PoseConfig, Trunk
 from go2_wbc.records import Record
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Retired, past_table, ranged, retires
@@ -29,13 +26,28 @@ LEAST_HEIGHT, GREATEST_HEIGHT = 0.18, 0.34
 @dataclass(frozen=True, slots=True)
 @retires(
     load_ramp=Retired(0.03, "LocomotionConfig.mpc.load_ramp counts"),
-    contact=past_table(contact, "earliest", "step"),
+    contact=past_table("contact", earliest=swing.EARLIEST, step=swing.STEP),
     ground=past_table(
-        *(ground, "slope_share", "follow", "smooth", "most_raise", "calming", "stumble", "delay")
+        "ground",
+        slope_share=ground.SLOPE_SHARE,
+        follow=ground.FOLLOW,
+        smooth=ground.SMOOTH,
+        most_raise=ground.MOST_RAISE,
+        calming=ground.CALMING,
+        stumble=ground.STUMBLE,
+        delay=ground.DELAY,
     ),
     slip=past_table(
-        *(slip, "speed", "patience", "mask", "steepness", "time_constant", "recovery", "least"),
-        *("most", "half_speed"),
+        "slip",
+        speed=ground.SLIP_SPEED,
+        patience=ground.SLIP_PATIENCE,
+        mask=ground.TOUCHDOWN_MASK,
+        steepness=ground.MOST_STEEPNESS,
+        time_constant=ground.FRICTION_FALL_TIME,
+        recovery=ground.FRICTION_RISE,
+        least=ground.LEAST_FRICTION,
+        most=ground.MOST_FRICTION,
+        half_speed=ground.HALF_SPEED,
     ),
 )
 @ranged(

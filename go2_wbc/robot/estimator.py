@@ -50,7 +50,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from go2_wbc.algebra.vectors import cross, triple
+from go2_wbc.algebra.linear import cross, triple
 from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.legs import LEGS
 from go2_wbc.records import (

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from go2_wbc.algebra.vectors import cross, dot, plus_scaled, put, triple
+from go2_wbc.algebra.linear import cross, dot, plus_scaled, put, triple
 from go2_wbc.compilation import subroutine
 from go2_wbc.records import V3, Array3, Array3x3, Record
 

@@ -25,7 +25,7 @@ from typing import final
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.algebra.vectors import rotation_of
+from go2_wbc.algebra.linear import rotation_of
 from go2_wbc.compilation import Foreign, kernel
 from go2_wbc.records import Record
 from go2_wbc.robot.state import RobotState

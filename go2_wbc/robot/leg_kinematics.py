@@ -29,7 +29,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from jaxtyping import Bool, Float
 
-from go2_wbc.algebra.vectors import turned_back
+from go2_wbc.algebra.linear import turned_back
 from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import JOINT_NAMES, LEGS, Leg

@@ -28,15 +28,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool
 
-from go2_wbc.algebra.linear import solve_linear
-from go2_wbc.algebra.vectors import cross, plus, plus_scaled, put, triple
+from go2_wbc.algebra.linear import cross, plus, plus_scaled, put, solve_linear, triple
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.records import V3, Array3, Array6, Array12, Array18, Record, packed
-from go2_wbc.robot.joint_friction import JointFriction, friction_torque
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.motor import JointFriction, friction_torque
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
-from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.state import RobotState, Snapshot
 from go2_wbc.validation import FINITE, POSITIVE, SHARE, between, ranged, require
 
 PERIOD = 0.02

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from go2_wbc.algebra.vectors import dot, triple
+from go2_wbc.algebra.linear import dot, triple
 from go2_wbc.compilation import subroutine
 from go2_wbc.records import Array3, Array3x3, Array12, Record
 from go2_wbc.robot.estimator_config import EstimatorConfig

@@ -21,7 +21,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.algebra.vectors import (
+from go2_wbc.algebra.linear import (
     Axes,
     about_x,
     about_y,
@@ -36,7 +36,7 @@ from go2_wbc.algebra.vectors import (
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.records import V3, Array4x3, Array12, Array18, Array19, Record
 from go2_wbc.robot.payload import Payload
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 
 Inertia = tuple[float, float, float, float, float, float]
 Body = tuple[float, V3, Inertia]
@@ -405,7 +405,7 @@ def fill_snapshot(
     q: Foreign[Array19], v: Foreign[Array18], robot: RigidBodies, now: Snapshot
 ) -> None:
     """Fill a snapshot, from the measured q and v, for ``robot``."""
-    now.q[:], now.v[:] = q, v
+    now.q[:], now.v[:], now.foot_radius = q, v, robot.foot_radius
     now.mass_matrix[:], now.J_feet[:], now.J_contacts[:], now.com_shift[:] = 0.0, 0.0, 0.0, 0.0
     R = now.R_world_base
     rotation_of(q[3], q[4], q[5], q[6], R)

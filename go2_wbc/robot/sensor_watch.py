@@ -24,7 +24,7 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
-from go2_wbc.algebra.vectors import cross, dot, plus_scaled, put, triple
+from go2_wbc.algebra.linear import cross, dot, plus_scaled, put, triple
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.records import V3, Array3, Array4, Array4x3, Array12, Record, numbers_of, packed

@@ -27,7 +27,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
-from go2_wbc.algebra.vectors import put, rotation_of, turned
+from go2_wbc.algebra.linear import put, rotation_of, turned
 from go2_wbc.compilation import subroutine
 from go2_wbc.records import V3, Array3, Array3x3, Array4, Array4x3, Record, layout_of
 from go2_wbc.robot.estimator_config import EstimatorConfig

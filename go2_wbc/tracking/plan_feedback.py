@@ -16,7 +16,7 @@ from jaxtyping import Float
 from go2_wbc.motion_plan import PlanFeedback
 from go2_wbc.reference import Anchor, Reference
 from go2_wbc.robot.rotations import log_rotation, rotation_from_quaternion, yaw_rotation
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 
 MOST_FEET = 2
 """Standing feet up to which the feedback is the plan's; more can give any moment."""

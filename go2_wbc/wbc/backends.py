@@ -8,8 +8,8 @@ from jaxtyping import Float
 from go2_wbc.errors import QpInfeasible
 from go2_wbc.records import Array30, packed
 from go2_wbc.reference import Target
+from go2_wbc.wbc.condensed import Reduction, reduce_equalities
 from go2_wbc.wbc.constraints import StanceFeetStill
-from go2_wbc.wbc.elimination import Reduction, reduce_equalities
 from go2_wbc.wbc.problem import SIZE, Problem
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 
@@ -37,7 +37,7 @@ def solve_condensed(problem: Problem, solver: str) -> Array30:
 
 
 def eliminate_equalities(problem: Problem) -> tuple[Float[np.ndarray, "30 12"], Array30] | None:
-    """Z and z0 such that z = Z u + z0 meets every equality (``elimination``); None if singular."""
+    """Z and z0 such that z = Z u + z0 meets every equality (``condensed``); None if singular."""
     reduction, still = Reduction(), packed(problem.source(StanceFeetStill))
     target = Target.of(problem.reference.row)
     if not reduce_equalities(problem.snapshot, target, still, reduction):

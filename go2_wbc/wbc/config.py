@@ -6,10 +6,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from go2_wbc.brief import brief
 from go2_wbc.records import Array3
 from go2_wbc.reference import LEAST_WEIGHT, MOST_WEIGHT
-from go2_wbc.robot.joint_friction import JointFriction
+from go2_wbc.robot.motor import JointFriction
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, Rule, between, ranged
+from go2_wbc.world import RANGES
 
 WEIGHTS = (1e-3, 1e3)
 """Least and greatest weight of a task. At all 16 corners of these ranges four solvers agree within
@@ -43,7 +45,7 @@ class Gains:
 
 
 @dataclass(frozen=True, slots=True)
-@ranged(WEIGHT, limit_horizon=POSITIVE, friction=POSITIVE)
+@ranged(WEIGHT, limit_horizon=POSITIVE, friction=between(*RANGES["friction"]))
 class DynamicWbcConfig:
     """What is different for plans with flights or few feet; tuned on five seeds in simulation.
 
@@ -76,6 +78,7 @@ class DynamicWbcConfig:
     orientation_weight=WEIGHT_OR_NONE,
     swing_weight=WEIGHT,
     flight_weight=WEIGHT,
+    friction=between(*RANGES["friction"]),
     posture_weight=WEIGHT,
     force_weight=between(*FORCE_WEIGHTS),
     torque_share=SHARE,
@@ -137,6 +140,8 @@ class WbcConfig:
     joint_margin: float = 0.0
     joint_friction: JointFriction = field(default_factory=JointFriction)
     dynamic: DynamicWbcConfig = field(default_factory=DynamicWbcConfig)
+
+    __repr__ = brief
 
     @property
     def for_dynamics(self) -> WbcConfig:

@@ -16,14 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.algebra.vectors import plus_scaled, triple
+from go2_wbc.algebra.linear import plus_scaled, triple
 from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.errors import ConfigError
 from go2_wbc.records import V3, Array6, Array12, Record, packed
 from go2_wbc.reference import STANCE, Reference, Target
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import MotorModel, torque_range
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.problem import FORCES, SIZE, Bounds, Rows, Source
 

@@ -1,10 +1,17 @@
-"""The whole-body controller: (snapshot, reference) -> torques, by one quadratic program a tick."""
+"""The whole-body controller: (snapshot, reference) -> torques, by one quadratic program a tick.
+
+No back end may be given numbers that are not finite. A nan makes its way through a solver in many
+forms: one takes seconds to give up, another takes a nan bound for an open side, and an infinite
+least force is no bound to a third. So every back end is asked only after the arrays were looked at,
+used or not, and the error names the first bad number. The least normal force may be -inf and the
+greatest inf: there is no such bound then.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -12,22 +19,109 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.algebra.active_set import SOLVED
-from go2_wbc.errors import ConfigError, QpInfeasible, unknown_name
-from go2_wbc.records import Array30, layout_of, packed
-from go2_wbc.reference import Reference
-from go2_wbc.robot.joint_friction import FrictionFeedForward
+from go2_wbc.brief import brief
+from go2_wbc.errors import ConfigError, QpInfeasible, ResidualRow, unknown_name
+from go2_wbc.records import Array4x3, Array12, Array18, Array30, layout_of, packed
+from go2_wbc.reference import BodyTarget, Reference, Target
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.motor import FrictionFeedForward
+from go2_wbc.robot.state import JointCommand, Snapshot
+from go2_wbc.validation import is_finite_number
 from go2_wbc.wbc.backends import solve_condensed, solve_full
 from go2_wbc.wbc.condensed import Decision, QpNumbers, Workspace, solve_tick
 from go2_wbc.wbc.config import WbcConfig
-from go2_wbc.wbc.constraints import Constraints, Equality, FloatingBaseDynamics, Inequality
-from go2_wbc.wbc.inputs import check_extra_tasks, check_inputs, check_problem, stacked
-from go2_wbc.wbc.problem import SIZE, Bounds, Problem
+from go2_wbc.wbc.constraints import (
+    Constraints,
+    Equality,
+    FloatingBaseDynamics,
+    Inequality,
+    torque_map,
+)
+from go2_wbc.wbc.problem import ACCELERATION, FORCES, SIZE, Bounds, Problem, Rows, Source
 from go2_wbc.wbc.relaxation import solve_relaxed
-from go2_wbc.wbc.solution import WbcSolution
 from go2_wbc.wbc.solvers import check_solver
 from go2_wbc.wbc.tasks import BuiltInTasks, Task
+
+GREATEST_EXTRA_WEIGHT = 1e4
+"""Weight of a user's own task beyond which nothing is left of the others' accuracy."""
+_IN_BODY = frozenset(BodyTarget.__dataclass_fields__)
+_IN_STATE = ("q", "v")
+_Z, _TAU, _MOTORS = (layout_of(Decision).slice(part) for part in ("z", "tau", "tau_motors"))
+_NO_ROWS, _DECISION = np.empty((0, SIZE + 2)), layout_of(Decision).size
+
+
+@dataclass(frozen=True, slots=True)
+class WbcSolution:
+    """One solution of the whole-body QP.
+
+    Attributes:
+        tau: joint torques [N m] of the dynamics, without friction: M qdd + h = S' tau + J' f.
+        tau_motors: what the motors are told [N m]: ``tau`` and the friction of the joints, within
+            what they give at their speeds.
+        solve_time: seconds of assembly and solution.
+        backend: which back end solved it.
+        is_relaxed: whether constraints had to give way, see ``violations``.
+    """
+
+    tau: Array12
+    tau_motors: Array12
+    solve_time: float
+    backend: str
+    _formulate: Callable[[], Problem]
+    _z: Array30
+    is_relaxed: bool = False
+
+    __repr__ = brief
+
+    @staticmethod
+    def of_row(
+        row: Float[np.ndarray, " size"],
+        solve_time: float,
+        backend: str,
+        formulate: Callable[[], Problem],
+    ) -> WbcSolution:
+        """The solution whose arrays ``row`` holds (see ``condensed.Decision``)."""
+        return WbcSolution(row[_TAU], row[_MOTORS], solve_time, backend, formulate, row[_Z])
+
+    @staticmethod
+    def from_decision(
+        z: Array30, problem: Problem, solve_time: float, backend: str, *, is_relaxed: bool = False
+    ) -> WbcSolution:
+        """Torques from the joint rows of M a + h = tau + J' f; no friction is fed forward."""
+        A, offset = torque_map(problem.snapshot)
+        tau = A @ z + offset
+        return WbcSolution(tau, tau, solve_time, backend, lambda: problem, z, is_relaxed)
+
+    @property
+    def qdd(self) -> Array18:
+        """Generalised acceleration.
+
+        Pinocchio's spatial base acceleration in the base frame [m/s^2, rad/s^2], then the joints
+        [rad/s^2].
+        """
+        return self._z[ACCELERATION]
+
+    @property
+    def forces(self) -> Array4x3:
+        """Contact force [N] of each foot in the world frame; zero for legs in the air."""
+        return self._z[FORCES].reshape(4, 3)
+
+    @property
+    def residuals(self) -> tuple[ResidualRow, ...]:
+        """Error of every task and violation of every constraint, in its own unit."""
+        return self._formulate().residuals(self._z)
+
+    @property
+    def violations(self) -> tuple[ResidualRow, ...]:
+        """By how much each constraint is broken, in its own unit; rounding, unless relaxed."""
+        problem = self._formulate()
+        constraints = len(problem.sources) - sum(isinstance(s, Task) for s in problem.sources)
+        return problem.residuals(self._z)[-constraints:]
+
+    @property
+    def command(self) -> JointCommand:
+        """The motors' torques as a joint command."""
+        return JointCommand.torque(self.tau_motors)
 
 
 class WholeBodyController:
@@ -189,4 +283,69 @@ class WholeBodyController:
         return np.column_stack([A, b, weights]).astype(float, order="C")
 
 
-_NO_ROWS, _DECISION = np.empty((0, SIZE + 2)), layout_of(Decision).size
+def check_extra_tasks(tasks: Sequence[Task]) -> None:
+    """Look at the weights of a user's own tasks.
+
+    Raises:
+        ConfigError: for a weight that is no number from 0 to ``GREATEST_EXTRA_WEIGHT``.
+    """
+    for task in tasks:
+        weight = task.weight
+        if not (is_finite_number(weight) and 0.0 <= float(weight) <= GREATEST_EXTRA_WEIGHT):
+            raise ConfigError(
+                f"the weight of the task {task.name!r} must be between 0 and "
+                f"{GREATEST_EXTRA_WEIGHT:g}, got {weight!r}"
+            )
+
+
+def check_inputs(snapshot: Snapshot, reference: Reference, solver: str) -> None:
+    """Look at every array of both.
+
+    Raises:
+        QpInfeasible: for the first number that is not finite, by name and place.
+        CommandError: for an array that has another shape than it should, or holds no numbers.
+    """
+    for index in np.flatnonzero(~np.isfinite(snapshot.row)).tolist():
+        name, place = layout_of(Snapshot).place(index)
+        owner = "snapshot.state" if name in _IN_STATE else "snapshot"
+        raise QpInfeasible(solver, f"{owner}.{name}{place} is {snapshot.row[index]}")
+    for index in np.flatnonzero(~np.isfinite(reference.row)).tolist():
+        name, place = layout_of(Target).place(index)
+        value = reference.row[index]
+        if {"normal_force_min": -np.inf, "normal_force_max": np.inf}.get(name) != value:
+            owner = "reference.body" if name in _IN_BODY else "reference"
+            raise QpInfeasible(solver, f"{owner}.{name}{place} is {value}")
+
+
+def check_problem(problem: Problem, solver: str) -> None:
+    """Look at the rows that were made of finite arrays: gains may be too great, a task wrong.
+
+    Raises:
+        QpInfeasible: for rows that are not finite, with the name of their task or constraint.
+    """
+    tasks, equalities, (C, lower, upper) = problem.tasks, problem.equalities, problem.bounds
+    parts = [
+        np.isfinite(tasks.A).all(axis=1) & np.isfinite(tasks.b),
+        np.isfinite(equalities.A).all(axis=1) & np.isfinite(equalities.b),
+        np.isfinite(C).all(axis=1) & (lower < np.inf) & (upper > -np.inf),
+    ]
+    bad = np.flatnonzero(~np.concatenate(parts))
+    if len(bad):
+        source = int(np.searchsorted(np.cumsum(problem.counts), bad[0], side="right"))
+        name = problem.sources[source].name
+        raise QpInfeasible(solver, f"the rows of {name!r} are not finite")
+
+
+def stacked(rows: Sequence[Rows], sources: Sequence[Source]) -> Rows:
+    """The rows of several tasks or constraints, one below the other.
+
+    Raises:
+        ConfigError: for rows that are no (k, 30) and (k,).
+    """
+    for part, source in zip(rows, sources, strict=True):
+        if np.shape(part.b) != (len(part.b),) or np.shape(part.A) != (len(part.b), SIZE):
+            raise ConfigError(
+                f"{source.name!r} has rows of the shapes {np.shape(part.A)} and "
+                f"{np.shape(part.b)}, wanted are (k, {SIZE}) and (k,)"
+            )
+    return Rows(np.concatenate([r.A for r in rows]), np.concatenate([r.b for r in rows]))

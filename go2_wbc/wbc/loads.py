@@ -16,7 +16,7 @@ from jaxtyping import Float
 from go2_wbc.compilation import subroutine
 from go2_wbc.records import Array4
 from go2_wbc.reference import STANCE, Target
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 
 LEAST_LOAD, MOST_LOAD = 0.05, 2.0
 """Bounds of a foot's load, over the mean of the standing feet, by which it is spared: own

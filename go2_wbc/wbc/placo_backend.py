@@ -35,8 +35,7 @@ from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.inverse_kinematics import load_placo_robot
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation
-from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.state import RobotState, Snapshot
 from go2_wbc.wbc.config import Gains, WbcConfig
 from go2_wbc.wbc.constraints import FrictionPyramid, JointLimits, TorqueLimits
 from go2_wbc.wbc.problem import ACCELERATION, FORCES, SIZE, Bounds, Problem

@@ -24,7 +24,7 @@ from jaxtyping import Bool, Float
 from go2_wbc.errors import ResidualRow
 from go2_wbc.records import Array30
 from go2_wbc.reference import Reference
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 
 ACCELERATION = slice(0, 18)
 """a in z: m/s^2 and rad/s^2 of the base in its own frame, then rad/s^2 of the joints."""

@@ -19,11 +19,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.algebra.vectors import cross, rotation_vector, triple, turned, turned_back
+from go2_wbc.algebra.linear import cross, rotation_vector, triple, turned, turned_back
 from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.records import V3, Array18, Record, packed
 from go2_wbc.reference import JOINTS, STANCE, SWING, Reference, Target
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.config import Gains, WbcConfig
 from go2_wbc.wbc.loads import plan_loads
 from go2_wbc.wbc.problem import SIZE, Rows, Source

@@ -16,8 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from go2_wbc.algebra.active_set import SOLVED, solve_qp
-from go2_wbc.algebra.linear import Square, Vector
-from go2_wbc.algebra.vectors import cross, triple, turned, turned_back
+from go2_wbc.algebra.linear import Square, Vector, cross, triple, turned, turned_back
 from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.records import Array3, Array3x3, Array4, Array6, Array12, ArrayNx3x3, ArrayNx12
 from go2_wbc.robot.leg_kinematics import LegGeometry, Legs

@@ -11,6 +11,7 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from go2_wbc.errors import MissingDependency, PlanNotFound, TimelineError
+from go2_wbc.extras import install_line
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
@@ -20,7 +21,6 @@ from motions.dynamics.phases import PhaseProblem, Progress, Tolerance
 from motions.dynamics.plan_audit import audit
 from motions.dynamics.plan_limits import PlanLimits, Weights
 
-INSTALL_LINE = "pip install go2-wbc[dynamics]"
 BUDGET = 20.0
 """Processor time [s] that solving may take."""
 SAME = 1e-9
@@ -192,7 +192,7 @@ def require_crocoddyl() -> None:
     except ImportError as error:
         raise MissingDependency(
             f"dynamic motions are solved with crocoddyl, which cannot be imported ({error}): "
-            f"{INSTALL_LINE}"
+            f"{install_line('dynamics')}"
         ) from error
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.brief import brief, cut, inline_html
 from go2_wbc.errors import MotionInfeasible
 from go2_wbc.world import World
 from motions.feasibility.goal_errors import Departure
@@ -81,6 +82,8 @@ class Series:
     margins: Float[np.ndarray, "n k"]
     tight: float = 0.0
     note: str = ""
+
+    __repr__ = brief
 
     @staticmethod
     def against(
@@ -173,6 +176,14 @@ class FeasibilityReport:
     world: World
     end_pose: tuple[float, float, float] | None = None
     departures: tuple[Departure, ...] = ()
+
+    _repr_html_ = inline_html
+
+    def __repr__(self) -> str:
+        """The verdict."""
+        verdict = "ok" if self.ok else f"not ok: {self.failures[0]}"
+        chance = f"{self.duration:.1f} s, chance {_percent(self.probability)}"
+        return cut(f"FeasibilityReport({self.motion!r}, {chance}, {verdict})")
 
     @staticmethod
     def of(

@@ -11,7 +11,7 @@ from go2_wbc.errors import TimelineError
 from go2_wbc.legs import Leg
 from motions import arguments
 from motions.arguments import is_number, positive, quantity
-from motions.language.clock import SAME, BeatClock
+from motions.language.clock import LEAST_BEAT, SAME, BeatClock
 from motions.language.easing import backwards
 from motions.language.keys import (
     ON_GROUND,
@@ -28,6 +28,10 @@ from motions.language.keys import (
 )
 from motions.language.timeline_data import TimelineData, distinct
 
+SLOWEST, FASTEST = 1.0, 60.0 / LEAST_BEAT
+"""Beats a minute of a tempo: own choice, nobody counts slower or faster."""
+SHORTEST = 0.1
+"""Time [s] that a repetition counts at the least against the longest motion."""
 _TIMES = ("cursor", "last_start", "floor", "counted_from")
 
 
@@ -75,7 +79,11 @@ class Arrangement(TimelineData):
         Before a foot is raised the trunk then moves aside in ``shift_time`` beats; by default in
         the fewest whole beats that are no shorter than the timeline's ``shift_time``.
         """
-        interval = 60.0 / positive("bpm", beats_per_minute)
+        if not SLOWEST <= positive("bpm", beats_per_minute) <= FASTEST:
+            raise TimelineError(
+                f"bpm must be {SLOWEST:g} to {FASTEST:g} beats a minute, got {beats_per_minute!r}"
+            )
+        interval = 60.0 / beats_per_minute
         return self._counted(BeatClock.steady(interval), shift_time)
 
     def on_beats(self, times: Iterable[float], *, shift_time: float | None = None) -> Self:
@@ -135,6 +143,7 @@ class Arrangement(TimelineData):
         """This whole motion, ``times`` times one after another; it must end as it began."""
         if isinstance(times, bool) or not isinstance(times, int) or times < 1:
             raise TimelineError(f"repeat() needs a whole number of 1 or more, got {times!r}")
+        self._require_length(times * max(self.end, SHORTEST))
         return self.then(*[self] * (times - 1))
 
     def mirror(self) -> Self:

@@ -115,6 +115,12 @@ class BodyAndFeet(TimelineData):
             times: when each is passed, counted from the start of this move in the unit of ``over``;
                 the last one is ``over``. Without them they are evenly spaced.
         """
+        if not (
+            isinstance(points, Sequence) and all(isinstance(point, Mapping) for point in points)
+        ):
+            raise TimelineError(
+                f"body_path() needs a list of points such as dict(x=0.05), got {points!r}"
+            )
         shares = _shares(len(points), over, times)
         for point in points:
             for channel in point:

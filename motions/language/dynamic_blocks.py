@@ -89,7 +89,7 @@ class DynamicBlocks(TimelineData):
 
         For one foot at a time, which takes no balance on a line, there is ``foot``.
         """
-        given = (legs,) if isinstance(legs, str) else legs
+        given = legs if isinstance(legs, Collection) and not isinstance(legs, str) else (legs,)
         feet = sorted({arguments.foot(leg) for leg in given})
         if len(feet) != 2:
             raise TimelineError(f"lift() takes two feet, such as ('FL', 'RR'), got {legs!r}")

@@ -55,7 +55,10 @@ def easing(ease: EaseWord) -> Easing:
     if not callable(ease):
         raise TimelineError(f"ease must be a name or a function of the share of time, got {ease!r}")
     for s in _TRIED:
-        value = ease(s)
+        try:
+            value = ease(s)
+        except ArithmeticError as error:
+            raise TimelineError(f"ease fails at {s:g}: {type(error).__name__}: {error}") from error
         if not is_number(value):
             raise TimelineError(f"ease must give a finite number, gave {value!r} at {s:g}")
     if abs(ease(0.0)) > NEAR or abs(ease(1.0) - 1.0) > NEAR:

@@ -5,10 +5,12 @@ The classes beside this one hold the calls that authors make; ``Timeline`` has t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self, TypeVar
 
+from go2_wbc.brief import inline_html
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
@@ -18,6 +20,9 @@ from motions.dynamics.phases import Tolerance
 from motions.language.clock import SAME, BeatClock
 from motions.language.keys import BODY_CHANNELS, BalanceShift, BodyKey, Key, LegKey
 
+LONGEST = 1200.0
+"""Time [s] that a motion may take unless ``Timeline(longest=...)`` says more: a check of 20 minutes
+of steps takes as long as these."""
 SHIFT_TIME = 0.9
 """Time [s] in which the body moves over the feet that stay, before another one is raised."""
 AS_WRITTEN, NEAREST = PHYSICS = ("as_written", "nearest")
@@ -42,6 +47,7 @@ class TimelineData:
         physics: "as_written", or "nearest": what the robot cannot do as written is solved as the
             nearest motion that it can.
         tolerance: how far what is solved may be from what is asked.
+        longest: how long [s] it may become: a slip of the pen is no motion of a day.
         keys: what was written so far.
         cursor: when [s] the next call starts.
         clock: what one unit of ``over`` lasts, here and later.
@@ -56,6 +62,7 @@ class TimelineData:
     shift_time: float = field(default=SHIFT_TIME, kw_only=True)
     physics: str = field(default=AS_WRITTEN, kw_only=True)
     tolerance: Tolerance = field(default=Tolerance(), kw_only=True)
+    longest: float = field(default=LONGEST, kw_only=True)
     keys: tuple[Key, ...] = field(default=(), kw_only=True)
     cursor: float = field(default=0.0, kw_only=True)
     clock: BeatClock = field(default=BeatClock(), kw_only=True)
@@ -65,8 +72,17 @@ class TimelineData:
     last_start: float = field(default=0.0, kw_only=True)
     floor: float = field(default=0.0, kw_only=True)
 
+    _repr_html_ = inline_html
+
+    def __repr__(self) -> str:
+        """Its name, length and ends."""
+        ends = f"{self.entry.value} to {self.exit.value}"
+        return f"Timeline({self.name!r}, {self.end:.2f} s, {len(self.keys)} moves, {ends})"
+
     def __post_init__(self) -> None:
-        """Raise TimelineError for postures that are none, or a track that moves twice at once."""
+        """Raise TimelineError for what is out of range, or a track that moves twice at once."""
+        if not isinstance(self.name, str):
+            raise TimelineError(f"name must be a word, got {self.name!r}")
         for name in ("entry", "exit"):
             if not isinstance(getattr(self, name), Posture):
                 valid = ", ".join(f"Posture.{posture.name}" for posture in Posture)
@@ -81,7 +97,16 @@ class TimelineData:
             raise TimelineError(
                 f"tolerance must be a Tolerance(position [m], angle [rad]), got {self.tolerance!r}"
             )
+        self._require_length(self.end)
         _require_no_overlap(self.keys)
+
+    def _require_length(self, end: float) -> None:
+        """Raise TimelineError if it would be longer than ``longest``."""
+        if end > positive("longest", self.longest):
+            raise TimelineError(
+                f"a motion of {end:g} s is longer than {self.longest:g} s: "
+                f"Timeline(longest={math.ceil(end):g}) allows it, if that is meant"
+            )
 
     # --- what is written ------------------------------------------------------------------
 

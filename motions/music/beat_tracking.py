@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
+from go2_wbc.brief import brief
 from go2_wbc.errors import CommandError
 from motions.music.songs import RATE, Sound, read_sound
 
@@ -76,6 +77,8 @@ class Beats:
     strengths: Times
     duration: float
     agreement: float
+
+    __repr__ = brief
 
 
 def beats(path: Path | str) -> Beats:

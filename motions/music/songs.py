@@ -15,10 +15,10 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.errors import CommandError, MissingDependency
+from go2_wbc.extras import install_line
 from go2_wbc.files import checked_output, write_atomically
 from motions.arguments import positive
 
-INSTALL_LINE = 'python -m pip install -e ".[music]"'
 RATE = 22050
 """Samples per second that are kept, or made: librosa's default, half of a compact disc's."""
 LONGEST = 900.0
@@ -57,7 +57,8 @@ def read_sound(path: Path | str) -> Sound:
         import librosa
         import soundfile
     except (ImportError, OSError) as error:  # soundfile: OSError without its C library
-        raise MissingDependency(f"music needs librosa ({error}): {INSTALL_LINE}") from error
+        line = install_line("music")
+        raise MissingDependency(f"music needs librosa ({error}): {line}") from error
     if not path.is_file():
         raise CommandError(f"{path}: there is no such file; give a song, such as song.wav")
     try:

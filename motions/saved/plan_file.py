@@ -101,7 +101,7 @@ def _arrays_of(file: Path) -> dict[str, np.ndarray]:
         with np.load(io.BytesIO(content_of(file)), allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
     except (*UNREADABLE, KeyError) as error:
-        raise MotionFileError(f"{file} is damaged, cut short, or no saved plan: {error}") from error
+        raise MotionFileError(f"{file} is damaged, cut short, or no saved plan") from error
 
 
 def _require_sane(plan: CompiledPlan) -> None:

@@ -59,7 +59,7 @@ class Encoder:
         if value is None or isinstance(value, bool | str):
             return value
         if is_number(value):
-            return int(value) if isinstance(value, Integral) else float(value)  # type: ignore[arg-type]
+            return int(value) if isinstance(value, Integral) else float(value)
         if isinstance(value, tuple | list):
             return [self.encoded(item, f"{where}[{i}]") for i, item in enumerate(value)]
         if isinstance(value, frozenset):

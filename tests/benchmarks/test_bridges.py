@@ -42,7 +42,7 @@ def test_without_the_extra_the_line_that_installs_it_is_named(
     monkeypatch.setitem(sys.modules, "cyclonedds.core", None)
     assert main(["bridges", "unitree"]) == ExitCode.RUNTIME
     complaint = capsys.readouterr().err
-    assert 'pip install -e ".[unitree]"' in complaint
+    assert 'pip install "go2-wbc[unitree]"' in complaint
     assert "Traceback" not in complaint
     assert not results_folder.exists()
 

@@ -10,7 +10,7 @@ import pytest
 
 from controller import GO2Controller
 from go2_wbc.errors import CommandError, ModeError
-from go2_wbc.planning.pose import LEVEL, BodyPose
+from go2_wbc.planning.trunk import LEVEL, BodyPose
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 

@@ -19,15 +19,15 @@ from go2_wbc.planning.command import ZERO_COMMAND
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.reference import JointReference, Reference
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.safety import SafetyConfig
-from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.state import RobotState, Snapshot
 from go2_wbc.wbc.config import WbcConfig
-from go2_wbc.wbc.controller import WholeBodyController
+from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
 from go2_wbc.wbc.relaxation import LIMITS
-from go2_wbc.wbc.solution import WbcSolution
-from motions.postures import TUCKED_JOINTS
 from tests.controller.plants import PERIOD, StillPlant, break_qp, is_limp
+
+TUCKED_JOINTS = find_profile().tucked_joints
 
 SAFETY = SafetyConfig()
 # Ticks that a silent plant is borne with.
@@ -90,9 +90,10 @@ def tilt(plant: StillPlant, roll: float) -> None:
 
 @pytest.mark.parametrize("is_hardware", [False, True])
 def test_a_simulated_robot_is_taken_where_it_will_be_and_one_that_may_be_real_where_it_is(
-    loop: ControlLoop, plant: StillPlant, monkeypatch: pytest.MonkeyPatch, *, is_hardware: bool
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, *, is_hardware: bool
 ) -> None:
     monkeypatch.setattr(StillPlant, "is_hardware", is_hardware)
+    loop: ControlLoop = request.getfixturevalue("loop")
     loop.engage(Balance(loop.model))
     run(loop, 3)
     assert loop.snapshot.state is loop.state

@@ -17,7 +17,7 @@ from controller.loop import ControlLoop
 from go2_wbc.errors import ModeError, PlantError
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.problem import SIZE, Rows
 from go2_wbc.wbc.tasks import Task

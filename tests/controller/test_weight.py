@@ -12,10 +12,9 @@ from controller.behaviours.weight import LEAST, FeltWeight, vertical_force
 from go2_wbc.legs import Leg
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.reference import LegTask, Target
-from go2_wbc.robot.joint_friction import JointFriction
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.motor import JointFriction
+from go2_wbc.robot.state import RobotState, Snapshot
 from tests.engine_helpers import random_state
 
 GRAVITY, DT = 9.81, 0.002

@@ -160,9 +160,10 @@ def test_a_place_that_cannot_be_written_costs_time_only(
         (kept_code.llvmlite.binding, "get_host_cpu_name", lambda: "another"),
         (kept_code.platform, "python_version", lambda: "3.99.0"),
         (kept_code.numba, "__version__", "99.0"),
+        (square, "__module__", "moved_to"),  # kept code imports where its parts were
     ],
 )
-def test_another_processor_or_version_gets_files_of_its_own(
+def test_another_processor_version_or_place_gets_files_of_its_own(
     folder: Path, monkeypatch: pytest.MonkeyPatch, owner: object, name: str, value: object
 ) -> None:
     routine = kernel(square)

@@ -96,7 +96,7 @@ def test_one_half_of_a_nested_table_may_be_left_out(tmp_path: Path) -> None:
         (
             "speed = 1",
             r"unknown key 'speed'; valid: backend, envelope, estimator, feasibility, locomotion,"
-            " motor, payload, pose, safety, wbc",
+            " motor, payload, pose, robot, safety, wbc",
         ),
         ("[wbc]\nsolvr = 'daqp'", r"mine\.toml: wbc: unknown key 'solvr'; valid: .*solver"),
         ("[wbc.swing_foot]\nki = [1, 1, 1]", r"wbc: swing_foot: unknown key 'ki'; valid: kd, kp"),
@@ -192,7 +192,7 @@ def test_a_controller_takes_a_file_a_path_or_a_config(tmp_path: Path) -> None:
     [
         ("[envelope]\nforward = 0", "VelocityEnvelope.forward must be positive, got 0.0"),
         ("motor = 'perfect'", "unknown motor 'perfect'; valid: ideal, torque-speed"),
-        ("[wbc]\nfriction = -0.6", "WbcConfig.friction must be positive, got -0.6"),
+        ("[wbc]\nfriction = -0.6", "WbcConfig.friction must be between 0.0001 and 2, got -0.6"),
         ("[wbc]\ntorque_share = 1.5", "WbcConfig.torque_share must be above 0 and at most 1"),
         ("[wbc]\nswing_weight = -1", "swing_weight must be between 0.001 and 1000, got -1.0"),
         ("[wbc.swing_foot]\nkp = [1, -1, 1]", r"kp must be between 0 and 1e\+06, got \(1.0, -1.0"),

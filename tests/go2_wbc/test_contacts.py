@@ -222,13 +222,6 @@ def test_whether_a_gait_needs_its_forces_planned_means_nothing_any_more() -> Non
     assert replace(replace(TROT, apex=0.05), apex=TROT.apex) == TROT
 
 
-def test_a_stride_gets_shorter_with_the_speed_until_the_foot_cannot() -> None:
-    stride = Stride()
-    assert stride.at(0.0) == pytest.approx((0.39, 20 / 39))
-    assert stride.at(2.0) == pytest.approx((0.31, 10 / 31))
-    assert stride.at(4.0) == pytest.approx((0.31, 8 / 31))
-
-
 @pytest.mark.parametrize(
     "changes", [{"stance_min": 0.3}, {"swing_slope": 0.2}, {"reach": 0.0}, {"swing_slope": -0.1}]
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import subprocess
 import sys
 from collections.abc import Iterator
 from importlib import import_module
@@ -124,3 +125,11 @@ PACKAGES = ("go2_wbc", "motions", "motions.dynamics", "motions.music", "viz", "c
 def test_every_public_name_of_a_package_is_found(name: str) -> None:
     found = import_module(name)
     assert [public for public in found.__all__ if getattr(found, public, None) is None] == []
+
+
+@pytest.mark.parametrize("name", ["motions", "controller"])
+def test_a_users_file_that_hides_a_package_is_named(name: str, tmp_path: Path) -> None:
+    (tmp_path / f"{name}.py").write_text("")
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import go2_wbc"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert f"{tmp_path / name}.py hides the package {name!r} of go2-wbc: rename it" in run.stderr

@@ -133,5 +133,5 @@ def test_a_number_is_told_by_its_name() -> None:
 
 def test_what_a_record_prints_fits_a_line() -> None:
     said = repr(Cart(time=0.25))
-    assert said.startswith("Cart(time=0.25, is_loaded=False, axes=[[0.0, 0.0, 0.0]")
-    assert "spare=Wheel(place=[0.0, 0.0, 0.0], turns=0.0)" in said
+    assert said.startswith("Cart(time=0.25, is_loaded=False, axes=<2 x 3>")
+    assert "spare=Wheel(place=(0, 0, 0), turns=0)" in said

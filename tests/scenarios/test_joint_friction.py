@@ -11,8 +11,8 @@ from controller import GO2Controller
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.model import JointDynamics
-from go2_wbc.robot.joint_friction import JointFriction
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.motor import JointFriction
 from motions import Timeline
 from motions.language.timeline import deg
 

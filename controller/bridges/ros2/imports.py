@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from go2_wbc.errors import MissingDependency
+from go2_wbc.extras import install_line
 
-INSTALL = 'python -m pip install -e ".[ros2]"'
+INSTALL = install_line("ros2")
 BUILD = "ros2/build_interfaces.sh python3 dist && python -m pip install dist/*.whl"
 PROFILE_VARIABLE, JAZZY_PROFILE_VARIABLE = (
     "FASTDDS_DEFAULT_PROFILES_FILE",

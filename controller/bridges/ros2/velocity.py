@@ -12,7 +12,7 @@ from controller.modes import Mode
 from controller.pacing import LogThrottle
 from go2_wbc.errors import CommandError
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope, finite_number
-from go2_wbc.planning.pose import LEVEL, BodyPose, PoseEnvelope
+from go2_wbc.planning.trunk import LEVEL, BodyPose, PoseEnvelope
 from go2_wbc.robot.rotations import rpy_from_quaternion
 
 _log = logging.getLogger(__name__)

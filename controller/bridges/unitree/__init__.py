@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 
 from go2_wbc.errors import MissingDependency
+from go2_wbc.extras import install_line
 
 
 def require_dds() -> None:
@@ -16,5 +17,5 @@ def require_dds() -> None:
         importlib.import_module("cyclonedds.core")
     except ImportError as error:
         raise MissingDependency(
-            f'Unitree\'s protocol needs CycloneDDS ({error}): python -m pip install -e ".[unitree]"'
+            f"Unitree's protocol needs CycloneDDS ({error}): {install_line('unitree')}"
         ) from error

@@ -21,12 +21,11 @@ from go2_wbc.contacts import GAITS
 from go2_wbc.errors import CommandError, Go2WbcError
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import VelocityCommand
-from go2_wbc.planning.pose import LEVEL, BodyPose
+from go2_wbc.planning.trunk import LEVEL, BodyPose
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle
-from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.state import RobotState, Snapshot
 from motions import FeasibilityChecker, Timeline, compile_motion, compile_timeline, motion_names
 from motions.postures import lean
 

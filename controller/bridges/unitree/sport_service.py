@@ -31,7 +31,7 @@ from controller.jobs import Answer, Job, JobServer
 from controller.modes import Aborted, Measurements, Mode
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
-from go2_wbc.planning.pose import BodyPose
+from go2_wbc.planning.trunk import BodyPose
 
 _log = logging.getLogger(__name__)
 

@@ -23,7 +23,7 @@ from go2_wbc.config import Config
 from go2_wbc.errors import CommandError, ModeError
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
-from go2_wbc.planning.pose import LEVEL, BodyPose
+from go2_wbc.planning.trunk import LEVEL, BodyPose
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import quaternion_from_rpy

@@ -30,7 +30,7 @@ def without_ros(code: str) -> subprocess.CompletedProcess[str]:
 def test_without_the_extra_the_command_names_the_line_that_installs_it() -> None:
     run = without_ros("from controller.cli.main import main; sys.exit(main(['ros2']))")
     assert run.returncode == ExitCode.RUNTIME
-    assert 'pip install -e ".[ros2]"' in run.stderr
+    assert 'pip install "go2-wbc[ros2]"' in run.stderr
     assert "Traceback" not in run.stderr
 
 

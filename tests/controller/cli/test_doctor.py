@@ -14,6 +14,7 @@ from controller.cli import doctor
 from controller.cli.common import PROGRAM, ExitCode
 from controller.cli.doctor import Finding, ImportProbe, Status
 from go2_wbc.errors import DescriptionError
+from go2_wbc.extras import EXTRAS
 from tests.controller.cli.conftest import Run
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -241,7 +242,7 @@ def test_long_details_wrap_at_80_columns_and_lines_to_type_never() -> None:
 def test_without_the_extra_one_note_names_the_line_that_installs_it() -> None:
     (finding,) = doctor.judge_ros2(dict.fromkeys(doctor.ROS2), {})
     assert finding.status is Status.NOTE
-    assert finding.remedy.endswith('pip install -e ".[ros2]"')
+    assert finding.remedy.endswith('pip install "go2-wbc[ros2]"')
 
 
 def test_interfaces_that_are_missing_are_built_and_ros_that_is_broken_is_installed() -> None:
@@ -252,15 +253,26 @@ def test_interfaces_that_are_missing_are_built_and_ros_that_is_broken_is_install
     found = {item.subject: item for item in doctor.judge_ros2(versions, probes_)}
     assert "ros2/build_interfaces.sh" in found["tf2-msgs"].remedy
     assert "no librcl" in found["ros-nav-msgs"].detail
-    assert '-e ".[ros2]"' in found["ros-nav-msgs"].remedy
+    assert '"go2-wbc[ros2]"' in found["ros-nav-msgs"].remedy
     others = [item for name, item in found.items() if name not in ("tf2-msgs", "ros-nav-msgs")]
     assert {item.status for item in others} == {Status.OK}
     assert not any(item.status is Status.PROBLEM for item in found.values())
 
 
 def test_a_missing_extra_is_a_note_with_its_install_line() -> None:
-    missing, old, right = (doctor.judge_extra("unitree", v) for v in (None, "0.10.2", "11.0.1"))
+    bounds = doctor.requirements_of("go2-wbc", "unitree")
+    assert bounds == {"cyclonedds": "==11.0.1"}
+    missing, old, right = (
+        doctor.judge_extra("unitree", bounds, {"cyclonedds": version})
+        for version in (None, "0.10.2", "11.0.1")
+    )
     assert missing.status is old.status is doctor.Status.NOTE
-    assert 'pip install "cyclonedds==11.0.1"' in missing.remedy
+    assert missing.remedy.endswith('-m pip install "go2-wbc[unitree]"')
+    assert "unitree-sim" in missing.detail
     assert "does not fit" in old.detail
     assert right.status is doctor.Status.OK
+
+
+def test_doctor_speaks_of_extras_that_there_are() -> None:
+    project = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())["project"]
+    assert set(EXTRAS) <= set(project["optional-dependencies"])

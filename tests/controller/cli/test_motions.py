@@ -108,11 +108,28 @@ def test_a_world_is_asked_for_by_its_friction_and_payload(run: Run) -> None:
     assert "That holds for friction 0.05, payload 2 kg." in said.out
 
 
+def test_the_numbers_of_a_file_count_in_a_check(tmp_path: Path, run: Run) -> None:
+    numbers = tmp_path / "go2.toml"
+    numbers.write_text("[feasibility]\ntorque_share = 0.1\n")
+    assert "ok" in run("check", "nod").out
+    assert "torque" in run("check", "nod", "--config", numbers, code=ExitCode.FAILED).out
+    numbers.write_text("[wbc]\nfriction = 900\n")
+    said = run("check", "nod", "--config", numbers, code=ExitCode.USAGE).err
+    assert "WbcConfig.friction must be between 0.0001 and 2, got 900" in said
+
+
 def test_check_gives_json_with_every_margin(run: Run) -> None:
     (report,) = json.loads(run("check", "high_five", "--set", "side=left", "--json").out)
     assert report["ok"]
     assert {"support", "torque", "foot load", "friction"} <= set(report["margins"])
     assert report["margins"]["support"]["margin"] > 0.0
+
+
+@pytest.mark.parametrize("name", ["motions", "json", "numpy"])
+def test_a_new_motion_hides_no_module(name: str, tmp_path: Path, run: Run) -> None:
+    said = run("new", name, "--out", tmp_path, code=ExitCode.USAGE).err
+    assert f"would hide the module {name!r}" in said
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_new_motion_is_feasible_is_not_written_twice_and_is_told_to_a_program(

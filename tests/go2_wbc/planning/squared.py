@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from go2_wbc.planning.locomotion import LocomotionConfig
 from go2_wbc.robot.rotations import rotation_from_rpy, yaw_rotation
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from tests import engine_helpers as helpers
 
 MODEL = helpers.symmetric_model()

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from go2_wbc.contacts import GAITS, ContactPhase, Gait
+from go2_wbc.contacts import GAITS, ContactPhase, Gait, Stride
 from go2_wbc.planning.gait_clock import (
     WIDTH_RATE,
     Cadence,
@@ -21,6 +21,7 @@ from go2_wbc.planning.gait_clock import (
     restart,
     resting_gait,
     shifted,
+    stride_at,
     time_between,
 )
 
@@ -228,3 +229,9 @@ def test_the_time_between_two_gaits_is_that_in_which_one_becomes_the_other(
         run(clock, seconds=1.01 * TICK, is_resting=False)
         ticks += 1
     assert ticks * TICK <= time_between(here, there) + 1.5 * TICK
+
+
+def test_a_stride_gets_shorter_with_the_speed_until_the_foot_cannot() -> None:
+    assert stride_at(Stride(), 0.0) == pytest.approx((0.39, 20 / 39))
+    assert stride_at(Stride(), 2.0) == pytest.approx((0.31, 10 / 31))
+    assert stride_at(Stride(), 4.0) == pytest.approx((0.31, 8 / 31))

@@ -14,7 +14,7 @@ from go2_wbc.planning.ground import GROUND_SHARE
 from go2_wbc.planning.locomotion import LocomotionPlanner
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.rotations import log_rotation, yaw_rotation
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from tests import engine_helpers as helpers
 from tests.go2_wbc.planning.squared import CONFIG, MODEL, at, moving, resting
 

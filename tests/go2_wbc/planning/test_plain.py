@@ -11,11 +11,11 @@ from go2_wbc.compilation import plain
 from go2_wbc.contacts import GAITS, Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner, plan
-from go2_wbc.planning.pose import LEVEL, BodyPose
+from go2_wbc.planning.trunk import LEVEL, BodyPose
 from go2_wbc.reference import Target
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from tests.engine_helpers import random_state, standing_q, state_of
 
 TICK = 0.002

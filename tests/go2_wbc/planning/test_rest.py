@@ -24,7 +24,7 @@ from go2_wbc.planning.rest import (
 from go2_wbc.planning.walk import Walk
 from go2_wbc.records import packed
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from tests.go2_wbc.planning.squared import CONFIG, MODEL, at, moving, resting
 
 TROT = GAITS["trot"]

@@ -1,19 +1,27 @@
-"""Swing feet: where they start, how high they go, where they land, and their derivatives."""
+"""Swing feet: where they start, how high they go, where they land, and when they stand."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from go2_wbc.contacts import GAITS
+from go2_wbc.contacts import GAITS, ContactPhase
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.gait_clock import Clock
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
-from go2_wbc.planning.swing import Swing, SwingConfig, swing_foot
+from go2_wbc.planning.swing import (
+    EARLIEST,
+    FootContact,
+    Swing,
+    SwingConfig,
+    follow_contact,
+    loaded_time,
+    swing_foot,
+)
 from go2_wbc.reference import Reference
 from tests import engine_helpers as helpers
 
@@ -27,6 +35,8 @@ LAST = 1.0 - 1e-12
 
 coordinates = st.floats(-0.5, 0.5)
 points = st.tuples(coordinates, coordinates, st.floats(-0.1, 0.1)).map(np.array)
+TROT, TICK, RAMP = GAITS["trot"].schedule(), 0.002, 0.03
+SWING = GAITS["trot"].swing_time
 
 
 def swing(
@@ -162,3 +172,59 @@ def test_a_foot_that_stumbles_begins_anew_where_it_is_and_leaves_the_other_swing
     assert stumbling[a_while].p_world_feet[0, 2] > start.p_world_feet[0, 2] + 0.01
     ends = [run[-1].p_world_feet[0] for run in (calm, stumbling)]
     np.testing.assert_allclose(*ends, atol=5e-3)  # but for the last tick's way
+
+
+@dataclass
+class Feet:
+    """The feet of a trot, and what is planned."""
+
+    phase: ContactPhase
+    feet: list[FootContact]
+    stance: np.ndarray
+
+    @property
+    def load_share(self) -> np.ndarray:
+        phase, times = self.phase, np.zeros(4)
+        for leg, foot in enumerate(self.feet):
+            planned, elapsed, left = phase.stance[leg], phase.elapsed[leg], phase.remaining[leg]
+            times[leg] = loaded_time(foot, planned, elapsed, left)
+        return np.where(self.stance, np.clip(times / RAMP, 0.0, 1.0), 0.0)
+
+
+def feet(until: float, *, touching: bool, above: float) -> Feet:
+    """The feet ``until`` seconds into a trot; at first front left and rear right swing."""
+    found = Feet(TROT.at(0.0), [FootContact(since=np.inf) for _ in range(4)], np.ones(4, bool))
+    for tick in range(1, round(until / TICK) + 1):
+        found.phase = TROT.at(tick * TICK)
+        for leg, foot in enumerate(found.feet):
+            planned, progress = found.phase.stance[leg], found.phase.progress[leg]
+            found.stance[leg] = follow_contact(foot, above, touching, planned, progress, TICK)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("touching", "above", "share"),
+    [(True, 0.0, 0.9), (False, 0.05, 0.9), (True, 0.05, EARLIEST - 0.1)],
+    ids=["on the ground", "in the air", "too soon"],
+)
+def test_feet_stand_when_it_is_planned(touching: bool, above: float, share: float) -> None:
+    contacts = feet(share * SWING, touching=touching, above=above)
+    phase = contacts.phase
+    assert not phase.stance.all()
+    np.testing.assert_array_equal(contacts.stance, phase.stance)
+    np.testing.assert_array_equal(contacts.load_share, phase.load_share(RAMP))
+
+
+def test_a_foot_that_finds_a_step_late_in_its_swing_stands_from_then_on() -> None:
+    contacts = feet(0.8 * SWING, touching=True, above=0.05)
+    assert contacts.stance.all()
+    begun = (0.8 - EARLIEST) * SWING
+    share = contacts.load_share[~contacts.phase.stance]
+    np.testing.assert_allclose(share, begun / RAMP, atol=2 * TICK / RAMP)
+
+
+def test_a_foot_that_has_found_a_step_keeps_its_load_at_the_planned_touchdown() -> None:
+    contacts = feet(SWING + TICK, touching=True, above=0.05)
+    landed = ~TROT.at(0.5 * SWING).stance
+    assert (contacts.load_share[landed] == 1.0).all()
+    assert (contacts.phase.load_share(RAMP)[landed] < 0.2).all()

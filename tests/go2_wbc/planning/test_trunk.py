@@ -1,23 +1,47 @@
-"""The trunk's reference on a slope, and what the forces are planned for there."""
+"""The trunk's way: its pose while walking, and its reference on a slope."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+import pinocchio as pin
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from go2_wbc.contacts import GAITS
+from go2_wbc.errors import CommandError, ConfigError
+from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.force_mpc import fill_goals
 from go2_wbc.planning.ground import FOLLOW, Ground
-from go2_wbc.planning.locomotion import LocomotionConfig
+from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.planning.mpc import NODES
-from go2_wbc.planning.trunk import Command, Trunk, fill_body
+from go2_wbc.planning.trunk import (
+    LEVEL,
+    BodyPose,
+    Command,
+    PoseConfig,
+    PoseEnvelope,
+    Trunk,
+    advance_pose,
+    fill_body,
+    pose_turn,
+)
 from go2_wbc.planning.walk import Planner, Walk
-from go2_wbc.reference import Target
-from go2_wbc.robot.rotations import log_rotation, yaw_rotation
+from go2_wbc.reference import Reference, Target
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy, yaw_rotation
+from tests.engine_helpers import standing_q, state_of
 from tests.go2_wbc.planning.squared import MODEL
 
 SLOPE = np.array([0.2, -0.1])
 EXACT = 1e-12
+TICK = 0.002
+ARRIVED = 2e-3  # of what is left a second after the greatest rate ends: exp(-5) of 0.07 rad
+DERIVED = 1e-6  # of central differences over 1e-5 s
+angles = st.floats(-0.6, 0.6)
+poses = st.builds(BodyPose, st.floats(-0.1, 0.1), angles, angles, angles)
 
 
 def attitude(yaw: float, slope: np.ndarray) -> np.ndarray:
@@ -42,3 +66,110 @@ def test_the_turn_that_is_planned_for_is_that_of_the_slope(slope: tuple[float, f
     turn = log_rotation(attitude(0.0, np.array(slope)))
     np.testing.assert_allclose(planner.horizon.goals[:, :3], np.tile(turn, (NODES, 1)), atol=EXACT)
     assert np.linalg.norm(turn) == pytest.approx(np.arctan(0.3))
+
+
+@pytest.mark.parametrize("name", ["height", "roll", "pitch", "yaw"])
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_a_pose_that_is_not_finite_is_refused_by_name(name: str, value: float) -> None:
+    with pytest.raises(CommandError, match=f"{name} must be finite"):
+        BodyPose(**{name: value})
+
+
+def test_a_pose_beyond_the_envelope_is_refused_with_every_bound_that_it_breaks() -> None:
+    envelope = PoseEnvelope(lowest=-0.05, highest=0.01, roll=0.1, pitch=0.2, yaw=0.3)
+    envelope.require(BodyPose(-0.05, 0.1, -0.2, 0.3))
+    with pytest.raises(CommandError) as refusal:
+        envelope.require(BodyPose(-0.06, 0.0, 0.21, -0.3))
+    text = str(refusal.value)
+    assert "height must be -0.05 to 0.01 m, got -0.06" in text
+    assert "pitch must be -0.2 to 0.2 rad, got 0.21" in text
+    assert "roll" not in text
+    assert "yaw" not in text
+
+
+@pytest.mark.parametrize(
+    ("bounds", "told"),
+    [
+        ({"lowest": 0.01}, "lowest must be 0 or below, got 0.01"),
+        ({"lowest": -math.inf}, "lowest must be 0 or below, got -inf"),
+        ({"roll": -0.1}, "PoseEnvelope.roll"),
+    ],
+)
+def test_an_envelope_without_the_level_pose_is_refused(bounds: dict[str, float], told: str) -> None:
+    with pytest.raises(ConfigError, match=told):
+        PoseEnvelope(**bounds)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_pose_is_approached_without_a_jump_and_not_overshot(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    first, last = (BodyPose(*rng.uniform(-1.0, 1.0, 4) * [0.1, 0.6, 0.6, 0.6]) for _ in range(2))
+    config = PoseConfig()
+    most = np.array([config.height_rate] + [config.turning_rate] * 3)
+    pose, rate = np.zeros(4), np.zeros(4)
+    for target in (first, last):
+        start = pose.copy()
+        low, high = np.minimum(start, target.row), np.maximum(start, target.row)
+        for _ in range(round(5.0 / TICK)):
+            before = rate.copy()
+            advance_pose(pose, rate, config, target.row, TICK)
+            assert (np.abs(rate) <= most + EXACT).all()
+            assert (np.abs(rate - before) <= config.sharpness * most * TICK + EXACT).all()
+            assert (pose >= low - EXACT).all()
+            assert (pose <= high + EXACT).all()
+        np.testing.assert_allclose(pose, target.row, atol=ARRIVED)
+
+
+def turn_of(yaw: float, pose: BodyPose, rate: BodyPose = LEVEL) -> tuple[np.ndarray, np.ndarray]:
+    turn, w = np.empty((2, 3))
+    pose_turn(yaw, pose.row, rate.row, turn, w)
+    return turn, w
+
+
+@given(st.floats(-3.0, 3.0), poses)
+def test_the_turn_of_a_pose_is_that_from_a_level_trunk_with_its_yaw(
+    yaw: float, pose: BodyPose
+) -> None:
+    level = yaw_rotation(yaw + pose.yaw)
+    R = yaw_rotation(yaw) @ rotation_from_rpy(pose.roll, pose.pitch, pose.yaw)
+    turn, _ = turn_of(yaw, pose)
+    np.testing.assert_allclose(turn, log_rotation(R @ level.T), atol=1e-9)
+
+
+@given(st.floats(-3.0, 3.0), poses, poses)
+def test_the_angular_velocity_of_a_pose_is_the_derivative_of_its_rotation(
+    yaw: float, pose: BodyPose, rate: BodyPose
+) -> None:
+    step = 1e-5
+
+    def rotation(t: float) -> np.ndarray:
+        _, roll, pitch, aside = pose.row + t * rate.row
+        return yaw_rotation(yaw) @ rotation_from_rpy(roll, pitch, aside)
+
+    _, w = turn_of(yaw, pose, rate)
+    derived = log_rotation(rotation(step) @ rotation(-step).T) / (2 * step)
+    np.testing.assert_allclose(w, derived, atol=DERIVED)
+
+
+def test_the_reference_of_a_walking_robot_arrives_at_the_pose_and_the_feet_stay() -> None:
+    model, asked = RobotModel(), BodyPose(-0.04, 0.1, 0.12, 0.2)
+    planners = [LocomotionPlanner(model, GAITS["trot"], LocomotionConfig()) for _ in range(2)]
+    start = model.snapshot(state_of(standing_q()))
+    for planner in planners:
+        planner.start(start)
+    command = VelocityCommand(0.0, 0.0, 1e-9)
+
+    def reference(
+        planner: LocomotionPlanner, pose: BodyPose, tick: int, q: np.ndarray
+    ) -> Reference:
+        return planner.update(model.snapshot(state_of(q, time=tick * TICK)), command, pose)
+
+    qs, asks = [standing_q(), standing_q()], (LEVEL, asked)
+    for tick in range(1, 1500):
+        for planner, pose, q in zip(planners, asks, qs, strict=True):
+            R = reference(planner, pose, tick, q).body.R_world_base
+            q[3:7] = pin.Quaternion(R).coeffs()  # the robot leans as it is asked to
+    level, leaning = map(reference, planners, asks, (1500, 1500), qs)
+    turned = level.body.R_world_base.T @ leaning.body.R_world_base
+    np.testing.assert_allclose(turned, rotation_from_rpy(0.1, 0.12, 0.2), atol=ARRIVED)
+    assert planners[1].heading == pytest.approx(planners[0].heading, abs=1e-6)

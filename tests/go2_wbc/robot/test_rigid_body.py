@@ -14,8 +14,7 @@ from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.rigid_body import fill_snapshot
-from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.state import RobotState, Snapshot
 from tests.compiled import assert_plain_is_compiled
 from tests.engine_helpers import random_state, state_of
 
@@ -152,5 +151,7 @@ def test_compiled_is_plain() -> None:
     robot = MODEL._bodies
     assert robot is not None
     for numbers in (robot, MODEL._loaded(robot, Payload(3.0, (0.1, -0.05, 0.1)))):
-        snapshot = Snapshot.of_row(state, np.full(len(MODEL.snapshot(state).row), np.nan))
+        snapshot = Snapshot.of_row(
+            state, np.full(len(MODEL.snapshot(state).row), np.nan), MODEL.profile
+        )
         assert_plain_is_compiled(fill_snapshot, state.q, state.v, numbers, snapshot)

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from go2_wbc.algebra.vectors import triple
+from go2_wbc.algebra.linear import triple
 from go2_wbc.compilation import plain
 from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.robot.leg_kinematics import leg_table

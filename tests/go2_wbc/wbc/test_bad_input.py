@@ -15,10 +15,9 @@ import pytest
 from go2_wbc.errors import CommandError, ConfigError, QpInfeasible
 from go2_wbc.reference import BodyTarget, Reference
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.config import FORCE_WEIGHTS, GREATEST_GAIN, WEIGHTS, Gains, WbcConfig
-from go2_wbc.wbc.controller import WholeBodyController
-from go2_wbc.wbc.inputs import GREATEST_EXTRA_WEIGHT
+from go2_wbc.wbc.controller import GREATEST_EXTRA_WEIGHT, WholeBodyController
 from go2_wbc.wbc.problem import SIZE, Rows
 from go2_wbc.wbc.tasks import Task
 from tests.engine_helpers import (

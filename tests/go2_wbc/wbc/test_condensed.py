@@ -18,7 +18,7 @@ from go2_wbc.reference import Reference, Target
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import Payload
 from go2_wbc.robot.rotations import rotation_from_rpy
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.condensed import Decision, Workspace, is_within, solve_tick
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WholeBodyController

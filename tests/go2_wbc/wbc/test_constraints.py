@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.constraints import (
     FloatingBaseDynamics,
     FrictionPyramid,

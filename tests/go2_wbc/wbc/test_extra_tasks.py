@@ -12,7 +12,7 @@ from go2_wbc.compilation import kernel
 from go2_wbc.errors import ConfigError
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.problem import SIZE, Rows
 from go2_wbc.wbc.tasks import Task

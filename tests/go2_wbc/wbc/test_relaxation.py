@@ -10,11 +10,10 @@ import pytest
 from go2_wbc.errors import QpInfeasible
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.config import WbcConfig
-from go2_wbc.wbc.controller import WholeBodyController
+from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
 from go2_wbc.wbc.relaxation import LIMITS, is_grave, solve_relaxed
-from go2_wbc.wbc.solution import WbcSolution
 from tests.engine_helpers import (
     MODES,
     motion_error,

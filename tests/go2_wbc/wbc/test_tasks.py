@@ -13,7 +13,7 @@ from go2_wbc.reference import LegTask, Reference, Target, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import Payload
 from go2_wbc.robot.rotations import log_rotation
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.loads import plan_loads
 from go2_wbc.wbc.tasks import (
     BodyOrientation,

@@ -146,5 +146,5 @@ def test_without_crocoddyl_the_extra_is_named(
     monkeypatch: pytest.MonkeyPatch, model: RobotModel
 ) -> None:
     monkeypatch.setitem(sys.modules, "crocoddyl", None)
-    with pytest.raises(MissingDependency, match=r"pip install go2-wbc\[dynamics\]"):
+    with pytest.raises(MissingDependency, match=r"pip install .go2-wbc\[dynamics\]"):
         solve(PROBLEMS["lift"], model)

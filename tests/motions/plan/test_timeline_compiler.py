@@ -93,7 +93,7 @@ def test_without_the_solver_a_new_motion_is_refused_with_the_line_that_installs_
 ) -> None:
     monkeypatch.setattr(plan_cache, "plan_folder", lambda: tmp_path)
     monkeypatch.setitem(sys.modules, "crocoddyl", None)
-    with pytest.raises(MissingDependency, match=r"pip install go2-wbc\[dynamics\]"):
+    with pytest.raises(MissingDependency, match=r"pip install .go2-wbc\[dynamics\]"):
         compile_timeline(Timeline().jump(height=0.0314), model)
 
 

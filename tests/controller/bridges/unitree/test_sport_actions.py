@@ -21,7 +21,7 @@ from controller.navigation import APPROACH
 from go2_wbc.contacts import GAITS
 from go2_wbc.errors import ClosedError, CommandError, MissingDependency, PlantError
 from go2_wbc.motion_plan import MotionPlan
-from go2_wbc.planning.pose import LEVEL, BodyPose
+from go2_wbc.planning.trunk import LEVEL, BodyPose
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion, motion_names
 from tests.controller.bridges.processes import wait_until

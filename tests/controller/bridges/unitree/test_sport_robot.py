@@ -15,7 +15,7 @@ from controller.bridges.unitree.sport_robot import SportRobot
 from controller.modes import Mode
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand
-from go2_wbc.planning.pose import LEVEL, BodyPose
+from go2_wbc.planning.trunk import LEVEL, BodyPose
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from tests.controller.bridges.processes import wait_until

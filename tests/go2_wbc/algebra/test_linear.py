@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from go2_wbc.algebra.vectors import quaternion_of, rotation_by, rotation_vector
+from go2_wbc.algebra.linear import quaternion_of, rotation_by, rotation_vector
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-5, 0.3, 2.0, 3.1, np.pi - 1e-7])
