@@ -187,6 +187,10 @@ WORLDS = (
 # --- other people's robots ------------------------------------------------------------------------
 
 
+def no_file() -> None:
+    """Of a robot without an MJCF; a lambda could not be sent to another process."""
+
+
 @dataclass(frozen=True, slots=True)
 class Robot:
     """One robot.
@@ -205,7 +209,7 @@ class Robot:
     item: str
     joints: JointDynamics | None = None
     config: Config | None = None
-    mjcf: Callable[[], Path | None] = lambda: None
+    mjcf: Callable[[], Path | None] = no_file
     robot: str = GO2
     calls: tuple[str, ...] = CALLS
 

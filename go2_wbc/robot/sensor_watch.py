@@ -77,6 +77,7 @@ class WatchedSensors(Record):
 
     Attributes:
         has_begun: 1 once there has been one.
+        step: the last time between two [s]; what turned while one was lost is not judged.
         q, v: the last angles [rad] and speeds [rad/s], as they were read.
         shift: what is taken off the angles [rad].
         dv: smoothed accelerations of the joints [rad/s^2].
@@ -94,6 +95,7 @@ class WatchedSensors(Record):
     """
 
     has_begun: float
+    step: float
     q: Array12
     v: Array12
     shift: Array12
@@ -187,12 +189,13 @@ def watch_encoders(s: WatchedSensors, r: SensorReading, dt: float) -> None:
             s.stuck[j] = 1.0
     for j in range(12):
         jump = r.q_joints[j] - s.q[j] - 0.5 * (r.v_joints[j] + s.v[j]) * dt
-        if abs(jump) > JUMP:
+        if abs(jump) > JUMP and dt < 1.5 * s.step:
             s.shift[j] += jump
             s.jumped[j] = 1.0 if abs(s.shift[j]) > 0.5 * JUMP else 0.0
         s.dv[j] += gain * ((r.v_joints[j] - s.v[j]) / dt - s.dv[j])
         s.q[j], s.v[j] = r.q_joints[j], r.v_joints[j]
         r.q_joints[j] -= s.shift[j]
+    s.step = dt
 
 
 @subroutine
@@ -381,7 +384,7 @@ def watch_sensors(
         take_last_for_nan(s, r)
         watch_encoders(s, r, dt)
     else:
-        s.has_begun = 1.0
+        s.has_begun, s.step = 1.0, dt
         for j in range(12):
             s.q[j], s.v[j] = r.q_joints[j], r.v_joints[j]
             r.q_joints[j] -= s.shift[j]
