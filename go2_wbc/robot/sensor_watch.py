@@ -77,7 +77,8 @@ class WatchedSensors(Record):
 
     Attributes:
         has_begun: 1 once there has been one.
-        step: the last time between two [s]; what turned while one was lost is not judged.
+        step: the last time between two [s].
+        whole: how many came since one was lost: what turned meanwhile is not judged.
         q, v: the last angles [rad] and speeds [rad/s], as they were read.
         shift: what is taken off the angles [rad].
         dv: smoothed accelerations of the joints [rad/s^2].
@@ -96,6 +97,7 @@ class WatchedSensors(Record):
 
     has_begun: float
     step: float
+    whole: float
     q: Array12
     v: Array12
     shift: Array12
@@ -176,6 +178,8 @@ def take_last_for_nan(s: WatchedSensors, r: SensorReading) -> None:
 def watch_encoders(s: WatchedSensors, r: SensorReading, dt: float) -> None:
     """Take jumps off the angles, and notice what has stopped."""
     gain = 1.0 - np.exp(-dt / SMOOTHING)
+    s.whole = s.whole + 1.0 if dt < 1.5 * s.step else 0.0
+    s.step = dt
     for j in range(12):
         first, turned = 3 * (j // 3), 0.0
         for k in range(first, first + 3):
@@ -189,13 +193,12 @@ def watch_encoders(s: WatchedSensors, r: SensorReading, dt: float) -> None:
             s.stuck[j] = 1.0
     for j in range(12):
         jump = r.q_joints[j] - s.q[j] - 0.5 * (r.v_joints[j] + s.v[j]) * dt
-        if abs(jump) > JUMP and dt < 1.5 * s.step:
+        if abs(jump) > JUMP and s.whole > 1.0:
             s.shift[j] += jump
             s.jumped[j] = 1.0 if abs(s.shift[j]) > 0.5 * JUMP else 0.0
         s.dv[j] += gain * ((r.v_joints[j] - s.v[j]) / dt - s.dv[j])
         s.q[j], s.v[j] = r.q_joints[j], r.v_joints[j]
         r.q_joints[j] -= s.shift[j]
-    s.step = dt
 
 
 @subroutine
@@ -384,7 +387,7 @@ def watch_sensors(
         take_last_for_nan(s, r)
         watch_encoders(s, r, dt)
     else:
-        s.has_begun, s.step = 1.0, dt
+        s.has_begun, s.step, s.whole = 1.0, dt, 2.0
         for j in range(12):
             s.q[j], s.v[j] = r.q_joints[j], r.v_joints[j]
             r.q_joints[j] -= s.shift[j]
