@@ -266,9 +266,9 @@ STUDIES = (
 
 BENCHMARK = Benchmark(
     "faults",
-    "Parts break: are they named in time, does the robot stay up; and are sound ones named?",
+    "Parts break: are they named in time, does the robot stay up;\nand is a sound one ever named?",
     STUDIES,
-    takes="everything: an hour",
+    takes="an hour on two cores",
     examples=("--sensors imu --rows parts", "--sensors imu --rows alarms"),
     sensors=True,
 )
