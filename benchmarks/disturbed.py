@@ -78,10 +78,10 @@ class Watch:
         may_lie: whether it was told to lie down.
     """
 
-    def __init__(self, robot: TrialRobot, rng: np.random.Generator) -> None:
-        """Watch ``robot``, whose plant calls ``look``."""
+    def __init__(self, robot: TrialRobot, rng: np.random.Generator | None) -> None:
+        """Watch ``robot``, whose plant calls ``look``; without ``rng`` nobody pushes."""
         self._robot, self._rng = robot, rng
-        self._next = float(rng.uniform(*PAUSE))
+        self._next = math.inf if rng is None else float(rng.uniform(*PAUSE))
         self._touches_since = self._fell = math.inf
         self._said = self._fell_as = robot.go2.mode
         self._stands_since = math.inf
@@ -104,8 +104,8 @@ class Watch:
     def look(self) -> None:
         """Once a tick."""
         mode, now = self._robot.go2.mode, self._robot.plant.time
-        if now >= self._next:
-            self._push(now)
+        if self._rng is not None and now >= self._next:
+            self._push(now, self._rng)
         if mode not in DOWN:
             self._judge(mode, now)
         else:
@@ -117,8 +117,8 @@ class Watch:
             self._has_risen = False
         self._said = mode
 
-    def _push(self, now: float) -> None:
-        rng, plant = self._rng, self._robot.plant
+    def _push(self, now: float, rng: np.random.Generator) -> None:
+        plant = self._robot.plant
         angle, impulse = rng.uniform((0.0, 0.0), (2.0 * math.pi, HARDEST)).tolist()
         force, where = heading_force(angle, impulse), "base"
         if rng.random() < 0.5:
@@ -135,8 +135,9 @@ class Watch:
         stands = height > RISEN and not touches and state.feet_in_contact.sum() >= LEAST_FEET
         self._stands_since = min(self._stands_since, now) if stands else math.inf
         has_stood = now - self._stands_since > STOOD
-        self._has_risen = mode.is_upright and (self._has_risen or has_stood)
-        is_down = self._has_risen and not self.may_lie and touches
+        has_risen = mode.is_upright and not self.may_lie
+        self._has_risen = has_risen and (self._has_risen or has_stood)
+        is_down = self._has_risen and touches
         self._touches_since = min(self._touches_since, now) if is_down else math.inf
         lies = now - self._touches_since > STUMBLE
         if math.isinf(self._fell) and (lies or state.tilt > FALLEN_TILT):

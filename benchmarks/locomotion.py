@@ -10,7 +10,8 @@ seeds 0 to 9; those judged begin at ``FIRST_SEED``.
 - mean velocity error: |mean - command| / |command|, in the direction of the command;
 - mean absolute error: mean of |velocity - command|, oscillation within the stride included;
 - turning: from the heading (unwrapped) at both ends of the window;
-- saturated ticks: share of ticks in which some motor gives all it has at its speed.
+- saturated ticks: share of ticks in which some motor gives all it has at its speed;
+- cost of transport: mean of the joints' sum of |torque x speed|, over weight times wanted speed.
 
 On sensors also (tuned on seeds 0 to 9 and 7000 to 7035, at 0.5 to 3 m/s), in a world that begins
 where the robot lies:
@@ -43,7 +44,7 @@ from controller.sweeps.studies import set_off
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
-from go2_wbc.planning.envelopes import TROT
+from go2_wbc.planning.envelopes import trot_of
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.plant.terrain import Slope, Stairs, Terrain
@@ -71,6 +72,7 @@ class Run:
         saturated: greatest share of saturated ticks [%]; None if it only informs.
         group: of the scenario.
         speed: greatest joint speed, as a share of its limit; None if it only informs.
+        cost: greatest cost of transport; None if it only informs.
     """
 
     name: str
@@ -81,6 +83,7 @@ class Run:
     saturated: float | None = None
     group: str = "trot"
     speed: float | None = 1.0
+    cost: float | None = None
 
     @property
     def study(self) -> Study:
@@ -90,12 +93,13 @@ class Run:
         rows = [
             ("mean", "mean velocity error", _bar(self.mean, "%")),
             ("mae", "mean absolute error", _bar(self.mae, "m/s")),
+            ("cost", "cost of transport", _bar(self.cost, "")),
             ("turn", "mean turning error", _bar(self.mean, "%")),
             ("saturated", "saturated ticks", _bar(self.saturated, "%")),
             ("speed", "peak joint speed / limit", _bar(self.speed, "")),
         ]
-        first, last = 0 if speed_of(c) else 2, 3 if c.angular_z else 2
-        table = {item: (*rows[first:last], *rows[3:])}
+        first, last = 0 if speed_of(c) else 3, 4 if c.angular_z else 3
+        table = {item: (*rows[first:last], *rows[4:])}
         return Study(self.name, table, partial(measure_run, run=self), group=self.group)
 
 
@@ -111,17 +115,18 @@ def speed_of(command: VelocityCommand) -> float:
 def measure_run(trial: Trial, found: TrialResult, run: Run) -> None:
     """Follow the command; see the module's docstring for what is measured."""
     plant, config = plant_of(trial, FIRST_SEED, UNTOLD), None
-    if speed_of(run.command) > TROT.forward:
+    if speed_of(run.command) > trot_of().forward:
         config = BEYOND
+    mass = plant.total_mass
     with TrialRobot(plant, config) as robot:
         set_off(robot, run.gait, run.command)
         robot.wait(START_TIME + WINDOW)
         recorded = robot.truth.recording()
-    found.values = measured(run, recorded.since(recorded.time[0] + START_TIME))
+    found.values = measured(run, recorded.since(recorded.time[0] + START_TIME), mass)
 
 
-def measured(run: Run, window: TruthRecording) -> dict[str, float]:
-    """The values of the run's rows."""
+def measured(run: Run, window: TruthRecording, mass: float) -> dict[str, float]:
+    """The values of the run's rows; ``mass`` of the robot [kg]."""
     command, model, wanted = run.command, RobotModel(), speed_of(run.command)
     values = {
         "saturated": 100.0 * float((window.torque_shares(model) >= FULL).mean()),
@@ -132,6 +137,8 @@ def measured(run: Run, window: TruthRecording) -> dict[str, float]:
         error = window.com_velocity[:, :2] @ direction - wanted
         values["mean"] = 100.0 * abs(float(error.mean())) / wanted
         values["mae"] = float(np.abs(error).mean())
+        power = np.abs(window.tau * window.v[:, 6:]).sum(axis=1).mean()
+        values["cost"] = float(power) / (mass * model.gravity * wanted)
     if command.angular_z:
         rate = (window.rpy[-1, 2] - window.rpy[0, 2]) / (window.time[-1] - window.time[0])
         values["turn"] = 100.0 * abs(rate / command.angular_z - 1.0)
@@ -139,10 +146,10 @@ def measured(run: Run, window: TruthRecording) -> dict[str, float]:
 
 
 RUNS = (
-    Run("ahead-0.5", "trot", VelocityCommand(0.5), 1.0, 0.012, 5.0),
-    Run("ahead-1.0", "trot", VelocityCommand(1.0), 1.0, 0.02, 5.0),
+    Run("ahead-0.5", "trot", VelocityCommand(0.5), 1.0, 0.012, 5.0, cost=0.85),
+    Run("ahead-1.0", "trot", VelocityCommand(1.0), 1.0, 0.02, 5.0, cost=0.78),
     Run("ahead-1.5", "trot", VelocityCommand(1.5), 1.0, 0.03, 5.0),
-    Run("ahead-2.0", "trot", VelocityCommand(2.0), 1.0, 0.04, 5.0),
+    Run("ahead-2.0", "trot", VelocityCommand(2.0), 1.0, 0.04, 5.0, cost=0.75),
     Run("ahead-2.5", "trot", VelocityCommand(2.5), 1.0, 0.05, 5.0),
     Run("ahead-3.0", "trot", VelocityCommand(3.0), 3.0, 0.08),
     Run("aside-0.5", "trot", VelocityCommand(0.0, 0.5), 2.0),

@@ -63,6 +63,7 @@ class GO2Controller:
         realtime: bool = False,
         viewer: bool = False,
         config: Config | Path | str | None = None,
+        robot: str | None = None,
         urdf: Path | str | None = None,
         after_tick: Callable[[], None] = lambda: None,
         extra_tasks: Sequence[Task] = (),
@@ -75,7 +76,9 @@ class GO2Controller:
             realtime: let the robot live at wall-clock pace in a background thread.
             viewer: open MuJoCo's viewer if there is a display.
             config: numbers of the engine, or a TOML file that overrides some.
-            urdf: another URDF of the Go2 instead of the installed one: what the controller takes
+            robot: name of its profile: "go2", "a1" or "go1"; by default that of the plant or the
+                configuration.
+            urdf: another URDF of the robot instead of the installed one: what the controller takes
                 the robot for. Without ``plant`` the simulated robot is built from it, too.
             after_tick: is called after every control period, in the thread that ticks.
             extra_tasks: tasks of your own in the whole-body QP, beside the built-in ones, whenever
@@ -85,20 +88,26 @@ class GO2Controller:
             ConfigError: for a namespace, configuration or task that is not valid, or without
                 ``realtime`` for a plant that needs it.
             SolverUnavailable: if the configured QP solver is unknown or not installed.
-            DescriptionError: if the robot's files are missing, broken, or not a Go2's.
+            DescriptionError: if the robot's files are missing, broken, or not such a
+                robot's.
             PlantError: if the plant does not answer.
         """
         self._namespace = arguments.namespace(namespace)
         viewer = arguments.checked("viewer", viewer, bool, "True or False")
-        config = arguments.config(config)
         plant = arguments.checked("plant", plant, Plant | None, "a Plant")
+        config = arguments.config(config, robot, plant)
         realtime = arguments.pace(realtime, plant)
         urdf = arguments.checked("urdf", urdf, Path | str | None, "a path")
-        description = find_description(None if urdf is None else Path(urdf))
+        description = find_description(None if urdf is None else Path(urdf), config.robot)
         tasks = arguments.tasks(extra_tasks)
         with ExitStack() as opened:
             if plant is None:
-                plant = MujocoPlant(urdf=description.urdf_path, visuals=viewer, motor=config.motor)
+                plant = MujocoPlant(
+                    urdf=description.urdf_path,
+                    robot=config.robot,
+                    visuals=viewer,
+                    motor=config.motor,
+                )
                 opened.callback(plant.close)
             self._plant = plant
             self._pilot = build_pilot(
@@ -242,8 +251,9 @@ class GO2Controller:
             CommandError: for another side or time.
         """
         if plan is None:
+            own = self._description.profile.motions.get("high_five", {})
             try:
-                timeline = motions.load_motion("high_five", side=side, hold=hold)
+                timeline = motions.load_motion("high_five", side=side, hold=hold, **own)
             except TimelineError as error:
                 raise CommandError(str(error)) from None
             with self._planning:
@@ -251,7 +261,12 @@ class GO2Controller:
         return self._call("high_five", lambda: self._pilot.play(plan, stands_up=True))
 
     def play(
-        self, motion: motions.Playable, *, check: bool = True, allow_dynamic: bool = False
+        self,
+        motion: motions.Playable,
+        *,
+        times: int = 1,
+        check: bool = True,
+        allow_dynamic: bool = False,
     ) -> bool:
         """Play a motion: a name of the library, a saved motion's file, a timeline, or a plan.
 
@@ -259,12 +274,14 @@ class GO2Controller:
 
         Args:
             motion: a ``Playable``.
+            times: how often, one after the other; what is measured is of the last one.
             check: with False also one that the robot cannot do is played, to see what happens.
             allow_dynamic: let also a robot that may be a real one (``Plant.is_hardware``) play
                 motions with flight or on fewer than three feet. Simulated ones always do.
 
         Raises:
-            CommandError: for an unknown name; lists the valid ones. Also for what is no motion.
+            CommandError: for an unknown name; lists the valid ones. Also for what is no motion, or
+                a number of times that is no whole number of 1 or more.
             TimelineError: for an empty timeline.
             MotionFileError: for a file that cannot be used.
             DynamicMotionRefused: for a dynamic motion on hardware without ``allow_dynamic``.
@@ -272,12 +289,17 @@ class GO2Controller:
             MotionInfeasible: if the motion breaks a limit of the robot; carries the findings.
         """
         self._check_open()
+        if isinstance(times, bool) or not isinstance(times, int) or times < 1:
+            raise CommandError(f"times must be a whole number of 1 or more, got {times!r}")
         plan = self.prepare(motion, check=check)
         with self._planning:
             departed = self._checker.departure(plan)
 
         def play() -> Measurements:
-            return {**self._pilot.play(plan, allow_dynamic=allow_dynamic), **departed}
+            measured: Measurements = {}
+            for _ in range(times):
+                measured = self._pilot.play(plan, allow_dynamic=allow_dynamic)
+            return {**measured, **departed}
 
         return self._call("play", play)
 

@@ -20,7 +20,7 @@ except ImportError as error:
 DOMAIN = 77
 
 command = [sys.executable, "-m", "controller.cli.main", "unitree-sim", "--domain", str(DOMAIN)]
-simulator = subprocess.Popen(command)
+simulator = subprocess.Popen(command, stdout=sys.stderr)  # what is printed here is ours
 try:
     sport = Client(Bus(DOMAIN, "lo"), "sport")
     if not sport.wait_for_server(60.0):

@@ -5,13 +5,23 @@ The loop's telemetry fills it, the viewers replay it, the benchmarks measure it.
 
 from __future__ import annotations
 
+import io
+import zipfile
 from dataclasses import dataclass, fields
 from itertools import groupby, pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from go2_wbc.brief import cut
+from go2_wbc.brief import cut, inline_html
+from go2_wbc.errors import ConfigError, MissingDependency
+from go2_wbc.extras import install_line
+from go2_wbc.files import checked_output, write_atomically
+
+if TYPE_CHECKING:
+    import pandas
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +65,8 @@ class Recording:
     support_margin: Float[np.ndarray, " n"]
     labels: tuple[str, ...]
 
+    _repr_html_ = inline_html
+
     def __repr__(self) -> str:
         """How long, and what was done."""
         done = " ".join(label for label, _ in groupby(self.labels))
@@ -74,6 +86,51 @@ class Recording:
         labels = np.array(self.labels, dtype=object)[rows]
         arrays = (getattr(self, field.name)[rows] for field in fields(self)[:-1])
         return Recording(*arrays, labels=tuple(labels))
+
+    def save(self, path: Path | str) -> Path:
+        """Write it to a ``.npz`` file, which ``load`` and ``numpy.load`` read; gives its path.
+
+        Raises:
+            ConfigError: for another ending, or a place that cannot be written to.
+        """
+        target, stream = checked_output(path, [".npz"]), io.BytesIO()
+        arrays = {field.name: np.asarray(getattr(self, field.name)) for field in fields(self)}
+        np.savez_compressed(stream, allow_pickle=False, **arrays)
+        return write_atomically(target, stream.getvalue())
+
+    @staticmethod
+    def load(path: Path | str) -> Recording:
+        """What ``save`` has written.
+
+        Raises:
+            ConfigError: if the file is missing, damaged, or no recording.
+        """
+        try:
+            with np.load(io.BytesIO(Path(path).read_bytes()), allow_pickle=False) as file:
+                *arrays, labels = (file[field.name] for field in fields(Recording))
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+            raise ConfigError(f"{path} is missing, damaged, or no recording of save()") from error
+        return Recording(*arrays, labels=tuple(labels.tolist()))
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """A pandas table, a row for each sample: ``time``, ``label``, ``q0`` to ``q18`` and so on.
+
+        Raises:
+            MissingDependency: without pandas; says how to get it.
+        """
+        try:
+            import pandas
+        except ImportError as error:
+            line = install_line("examples")
+            raise MissingDependency(f"a table needs pandas ({error}): {line}") from error
+        columns: dict[str, object] = {"time": self.time, "label": self.labels}
+        for field in fields(self)[1:-1]:
+            values = getattr(self, field.name)
+            if values.ndim == 1:
+                columns[field.name] = values
+            else:
+                columns |= {f"{field.name}{i}": column for i, column in enumerate(values.T)}
+        return pandas.DataFrame(columns)
 
     def spans(self) -> tuple[Span, ...]:
         """Stretches of equal labels, in order; each ends where the next begins."""

@@ -16,7 +16,7 @@ import go2_wbc
 import motions
 import viz
 from go2_wbc.errors import unknown_name
-from go2_wbc.robot.state import JointCommand
+from go2_wbc.reference import JointReference
 from tests import conftest, typechecker
 
 checking = pytest.mark.skipif(
@@ -26,9 +26,9 @@ checking = pytest.mark.skipif(
 
 @checking
 def test_an_array_of_the_wrong_shape_is_refused() -> None:
-    assert JointCommand.torque(np.zeros(12)).tau.shape == (12,)
-    with pytest.raises(TypeCheckError, match="tau"):
-        JointCommand.torque(np.zeros(11))
+    assert JointReference(np.zeros(12), np.zeros(12), 1.0, 1.0).kp == 1.0
+    with pytest.raises(TypeCheckError, match="v_joints"):
+        JointReference(np.zeros(12), np.zeros(11), 1.0, 1.0)
 
 
 @checking
@@ -97,7 +97,7 @@ def test_every_module_that_is_loaded_went_through_the_hook() -> None:
     """A module imported before ``conftest.py``, say by a pytest plugin, would go unchecked."""
     loaded = [name for name in conftest.checked_modules() if name in sys.modules]
     loaders = {name: type(sys.modules[name].__loader__).__module__ for name in loaded}
-    assert "go2_wbc.robot.state" in loaded
+    assert "go2_wbc.reference" in loaded
     assert {name: found for name, found in loaders.items() if "jaxtyping" not in found} == {}
 
 

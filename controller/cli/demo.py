@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import json
 import sys
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import count, groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from jaxtyping import Int
@@ -195,6 +194,7 @@ def _controller(output: Output, robot: Robot, control: Control) -> GO2Controller
     viewer = output.viewer and _has_display()
     plant = MujocoPlant(
         robot.mjcf,
+        robot=config.robot,
         friction=robot.friction,
         mass_scale=robot.mass_scale,
         seed=robot.seed or 0,
@@ -216,12 +216,8 @@ def _has_display() -> bool:
 
 
 def _write_data(recording: Recording, values: Mapping[str, object], paths: list[Path]) -> None:
-    """The arrays, which ``numpy.load`` reads back by field name, and the report."""
-    stream = io.BytesIO()
-    names = [field.name for field in fields(recording)]
-    arrays: dict[str, Any] = {name: np.asarray(getattr(recording, name)) for name in names}
-    np.savez_compressed(stream, **arrays)
-    write_atomically(paths[0], stream.getvalue())
+    """The recording and the report."""
+    recording.save(paths[0])
     write_atomically(paths[1], (json.dumps(values, indent=2) + "\n").encode())
 
 

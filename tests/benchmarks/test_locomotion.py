@@ -35,9 +35,11 @@ def test_errors_are_along_the_command_and_count_both_ways(fallen: TruthRecording
     steps = (0.49 * along + sway * along + 7.0 * across) * dt
     p = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
     run = Run("any", "trot", VelocityCommand(0.3, 0.4), 1.0)
-    values = measured(run, replace(fallen, p_world_com=p, rpy=np.zeros((n, 3))))
+    tau, v = np.tile([2.0, -2.0, 0.0], (n, 4)), np.full((n, 18), 3.0)
+    values = measured(run, replace(fallen, p_world_com=p, rpy=np.zeros((n, 3)), tau=tau, v=v), 16.0)
     assert values["mean"] == pytest.approx(2.0, abs=0.1)
     assert values["mae"] == pytest.approx(0.1, abs=1e-4)
+    assert values["cost"] == pytest.approx(8 * 2.0 * 3.0 / (16.0 * 9.81 * 0.5))
     assert {f"any.{name}" for name in values} == {m.name for m in run.study.metrics}
 
 
@@ -45,7 +47,7 @@ def test_turning_is_judged_by_the_heading(fallen: TruthRecording) -> None:
     rpy = np.zeros((len(fallen.time), 3))
     rpy[:, 2] = 2.2 * fallen.time
     run = Run("any", "trot", VelocityCommand(0.0, 0.0, 2.0), 1.0)
-    values = measured(run, replace(fallen, rpy=rpy))
+    values = measured(run, replace(fallen, rpy=rpy), 16.0)
     assert values["turn"] == pytest.approx(10.0, abs=1e-6)
     assert {f"any.{name}" for name in values} == {m.name for m in run.study.metrics}
 

@@ -34,12 +34,12 @@ CHECKS: dict[Posture, Callable[[Snapshot], bool]] = {
 }
 
 
-def at_rest(posture: Posture, ground: float = 0.0) -> Snapshot:
-    """In ``posture`` with the feet below the hips, the ground at a height."""
+def at_rest(posture: Posture, ground: float = 0.0, slope: float = 0.0) -> Snapshot:
+    """In ``posture`` with the feet below the hips, the ground at a height, or rising ahead."""
     pose = HOME[posture].copy()
     pose[2] = LYING if posture is Posture.LIE else pose[2]
     feet = MODEL.p_base_feet_nominal.copy()
-    feet[:, 2] = MODEL.foot_radius
+    feet[:, 2] = MODEL.foot_radius + slope * feet[:, 0]
     p_base_feet = (feet - pose[:3]) @ rotation_from_rpy(*pose[3:])
     joints = [leg_angles(LegGeometry.of(MODEL, leg), p_base_feet[leg][None]).q[0] for leg in LEGS]
     pose[2] += ground
@@ -56,6 +56,15 @@ def test_a_posture_is_known_whatever_the_height_of_the_ground(
     assert [name for name, check in CHECKS.items() if check(snapshot)] == [posture]
     level = posture_measurements(at_rest(posture))
     assert posture_measurements(snapshot) == pytest.approx(level, abs=1e-9)
+
+
+@pytest.mark.parametrize("slope", [-0.14, 0.14])
+@pytest.mark.parametrize("posture", [Posture.STAND, Posture.SIT])
+def test_on_a_slope_a_posture_has_its_height_over_the_ground_below_it(
+    posture: Posture, slope: float
+) -> None:
+    # The lowest foot of a robot that sat on 8 deg was 27 mm lower: it sat still, and `sit` said no.
+    assert CHECKS[posture](at_rest(posture, slope=slope))
 
 
 @pytest.mark.parametrize(("part", "speed"), [(0, 0.06), (8, 0.6)])  # the base, a joint

@@ -64,6 +64,7 @@ def test_a_number_that_is_not_finite_is_refused_by_name(
         (lambda go2: go2.move_forward(1e9), r"distance must be within \+-100 m, got 1"),
         (lambda go2: go2.high_five("up"), "unknown side 'up'; valid: left, right"),
         (lambda go2: go2.walk("canter"), "unknown gait 'canter'; valid: .*trot"),
+        (lambda go2: go2.play("nod", times=0), "times must be a whole number of 1 or more, got 0"),
         (lambda go2: go2.play("levitate"), "unknown motion 'levitate'; valid: .*high_five"),
         (lambda go2: go2.recording(rate=0.0), "rate must be positive, got 0.0"),
         (lambda go2: go2.recording(rate=nan), "rate must be positive, got nan"),

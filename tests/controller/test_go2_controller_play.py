@@ -122,3 +122,13 @@ def test_what_simulates_says_so() -> None:
     assert not plant.is_hardware
     assert LivePlant().is_hardware
     plant.close()
+
+
+def test_a_motion_is_played_as_often_as_asked() -> None:
+    dip = Timeline().body(z=-0.02, over=0.4).home(over=0.4)
+    with GO2Controller() as go2:
+        go2.stand()
+        start = go2.state.time
+        assert go2.play(dip, times=3), go2.last_outcome.reason
+        assert go2.state.time - start >= 3 * 0.8
+        assert go2.last_outcome.duration >= 3 * 0.8

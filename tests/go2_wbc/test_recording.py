@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
 
 
@@ -51,3 +53,27 @@ def test_equal_labels_become_one_span_and_spans_leave_no_gap(recording: Recordin
     assert [span.label for span in spans] == ["stand", "bow", "stand"]
     assert [span.start for span in spans] == pytest.approx([0.0, 0.2, 0.4])
     assert [span.end for span in spans] == pytest.approx([0.2, 0.4, 0.4])
+
+
+def test_a_recording_is_saved_and_loaded_whole(recording: Recording, tmp_path: Path) -> None:
+    again = Recording.load(recording.save(tmp_path / "run.npz"))
+    for field in fields(Recording):
+        mine, its = getattr(recording, field.name), getattr(again, field.name)
+        assert type(mine) is type(its)
+        np.testing.assert_array_equal(np.array(mine), np.array(its))
+
+
+@pytest.mark.parametrize("content", [None, b"", b"no archive", b"PK\x03\x04 cut"])
+def test_a_file_that_is_no_recording_is_told_so(content: bytes | None, tmp_path: Path) -> None:
+    path = tmp_path / "run.npz"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(ConfigError, match=r"run.npz is missing, damaged, or no recording"):
+        Recording.load(path)
+
+
+def test_a_recording_is_a_table_for_pandas(recording: Recording) -> None:
+    table = pytest.importorskip("pandas") and recording.to_dataframe()
+    assert list(table.columns[:3]) == ["time", "label", "q0"]
+    assert table["stance3"].tolist() == recording.stance[:, 3].tolist()
+    assert table.shape == (5, 2 + 19 + 18 + 12 + 4 + 4 + 3 + 1)

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tests.mutation.operators import Mutant, draw, mutants_of
-from tests.mutation.runner import Outcome, Sandbox, nearest_tests
+from tests.mutation.runner import Outcome, Sandbox, nearest_tests, own_tests
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PACKAGES: tuple[str, ...] = ("go2_wbc", "motions", "viz", "controller")
@@ -22,9 +22,11 @@ EQUIVALENT = Path(__file__).with_name("equivalent.toml")
 # Fast tests that take long or need a browser; they run with the whole suite only.
 LATE = ("test_seeded_faults.py", "test_pytest_plugin.py", "test_*browser.py")
 STAGES = NEAR, PACKAGE, SUITE = "module", "package", "suite"
-ALIVE = "alive"
-# CPU time [s] after which a mutant hangs: some times what the good code takes.
-LIMITS = {NEAR: 90.0, PACKAGE: 600.0, SUITE: 3600.0}
+ALIVE, TIMEOUT = "alive", "timeout"
+PLAIN = "plain"
+# CPU time [s] after which a mutant hangs: some times what the good code takes, and compiling. Plain
+# Python may take longer, so nothing is judged by its time.
+LIMITS = {PLAIN: 40.0, NEAR: 90.0, PACKAGE: 600.0, SUITE: 3600.0}
 
 
 def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
@@ -63,11 +65,14 @@ def package_mutants(root: Path, package: str) -> list[Mutant]:
 
 
 class Judge:
-    """Tests a mutant: by its module's own tests, its package's fast ones, then the whole suite."""
+    """Tests a mutant: by its module's own tests, its package's fast ones, then the whole suite.
+
+    Most are noticed by the module's own tests, which run first, and plain: compiling takes long.
+    """
 
     def __init__(self, sandbox: Sandbox, *, last: str) -> None:
         self._sandbox, self._last = sandbox, last
-        self._passing: dict[str, bool] = {}  # without any mutant
+        self._passing: dict[tuple[str, bool], bool] = {}  # without any mutant; and plain
         tests = sandbox.home / "tests"
         late = (file for pattern in LATE for file in tests.rglob(pattern))
         self._late = {str(file.relative_to(sandbox.home)) for file in late}
@@ -80,27 +85,39 @@ class Judge:
             (PACKAGE, [f"tests/{mutant.path.split('/')[0]}"], self._late | {*near}, "not slow"),
             *((SUITE, ["tests"], set[str](), marker) for marker in ("not slow", "slow")),
         ]
+        if own := [name for name in near if name in own_tests(self._sandbox.home, mutant.path)]:
+            outcome = self._test(mutant, own, self._late, "not slow", LIMITS[PLAIN], plain=True)
+            if not outcome.passed and not outcome.is_late:
+                return NEAR, outcome
         outcome = Outcome(True, "", 0.0)
         for stage, targets, excluded, marker in stages:
             if targets and STAGES.index(stage) <= STAGES.index(self._last):
                 outcome = self._test(mutant, targets, excluded, marker, LIMITS[stage])
                 if not outcome.passed:
-                    return stage, outcome
+                    return TIMEOUT if outcome.is_late else stage, outcome
         return ALIVE, outcome
 
     def _test(
-        self, mutant: Mutant, targets: list[str], excluded: set[str], marker: str, limit: float
+        self,
+        mutant: Mutant,
+        targets: list[str],
+        excluded: set[str],
+        marker: str,
+        limit: float,
+        *,
+        plain: bool = False,
     ) -> Outcome:
-        sandbox, failing = self._sandbox, {name for name, ok in self._passing.items() if not ok}
+        sandbox = self._sandbox
+        failing = {name for (name, how), ok in self._passing.items() if how == plain and not ok}
         source = (sandbox.home / mutant.path).read_bytes()
         sandbox.write(mutant.path, mutant.applied(source))
-        outcome = sandbox.test(targets, marker, sorted(excluded | failing), limit)
+        outcome = sandbox.test(targets, marker, sorted(excluded | failing), limit, plain=plain)
         sandbox.write(mutant.path, source)
-        name = outcome.failed
-        if name.startswith("tests/") and name not in self._passing:
-            self._passing[name] = sandbox.test([name], marker, (), limit).passed
-            if not self._passing[name]:  # it fails anyway: try again without it
-                return self._test(mutant, targets, excluded, marker, limit)
+        name, key = outcome.failed, (outcome.failed, plain)
+        if name.startswith("tests/") and key not in self._passing:
+            self._passing[key] = sandbox.test([name], marker, (), limit, plain=plain).passed
+            if not self._passing[key]:  # it fails anyway: try again without it
+                return self._test(mutant, targets, excluded, marker, limit, plain=plain)
         return outcome
 
 
@@ -134,7 +151,7 @@ class Results:
         for name, record in self.latest.items():
             stage = "equivalent" if name in self._equivalent else record["stage"]
             counts.setdefault(name.split("/")[0], Counter())[stage] += 1
-        columns = (NEAR, PACKAGE, SUITE, "equivalent", ALIVE)
+        columns = (NEAR, PACKAGE, SUITE, TIMEOUT, "equivalent", ALIVE)
         rows = [" | ".join(("package", "mutants", *columns))]
         for package, count in counts.items():
             numbers = (count.total(), *(count[column] for column in columns))

@@ -30,11 +30,19 @@ _BAD_CONFTEST, _NO_TESTS = 4, 5  # pytest's exit codes
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Whether all tests passed, which failed, and how long it took [s of CPU time]."""
+    """What tests said.
+
+    Attributes:
+        passed: whether all did.
+        failed: the first that did not, or how their process ended.
+        seconds: of CPU time.
+        is_late: whether they were stopped: their time was up.
+    """
 
     passed: bool
     failed: str
     seconds: float
+    is_late: bool = False
 
 
 class Sandbox:
@@ -58,16 +66,25 @@ class Sandbox:
         os.utime(self.home / path, (self._clock, self._clock))
 
     def test(
-        self, targets: Sequence[str], marker: str, excluded: Iterable[str], limit: float
+        self,
+        targets: Sequence[str],
+        marker: str,
+        excluded: Iterable[str],
+        limit: float,
+        *,
+        plain: bool = False,
     ) -> Outcome:
-        """Run tests up to the first failure, for at most ``limit`` seconds of CPU time."""
+        """Run tests up to the first failure, for at most ``limit`` seconds of CPU time.
+
+        With ``plain`` kernels run as the Python that they are written in: none is compiled anew.
+        """
         told = self.home.with_suffix(".txt")
         command = [*targets, "-q", "-m", marker, "-rfE", "-p", "no:cacheprovider"]
         command += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # libraries are loaded
         command += ["-x", *(f"--deselect={name}" for name in excluded)]
         before = _used()
         process = multiprocessing.get_context("fork").Process(
-            target=_run_pytest, args=(self.home, told, command, int(limit))
+            target=_run_pytest, args=(self.home, told, command, int(limit), plain)
         )
         process.start()
         try:
@@ -81,10 +98,11 @@ class Sandbox:
         if failed.startswith("exit") and code > 0 and code not in (_BAD_CONFTEST, _NO_TESTS):
             raise RuntimeError(f"the tests did not run: {text[-2000:]}")
         passed = code in (0, _NO_TESTS)
-        return Outcome(passed, "" if passed else failed, _used() - before)
+        is_late = code in (-signal.SIGXCPU, -signal.SIGKILL)
+        return Outcome(passed, "" if passed else failed, _used() - before, is_late)
 
 
-def _run_pytest(home: Path, told: Path, command: list[str], limit: int) -> None:
+def _run_pytest(home: Path, told: Path, command: list[str], limit: int, plain: bool) -> None:
     """In a fork: forget what was imported of the real tree, and test the copy."""
     gc.freeze()  # what the process before the fork has made stays
     os.setsid()
@@ -95,7 +113,7 @@ def _run_pytest(home: Path, told: Path, command: list[str], limit: int) -> None:
     os.chdir(home)
     os.environ.pop("PYTEST_ADDOPTS", None)
     # Without the checks of types: a test shall notice, and it is faster.
-    os.environ.update(PYTHONPATH=str(home), GO2_WBC_TYPECHECK="0")
+    os.environ.update(PYTHONPATH=str(home), GO2_WBC_TYPECHECK="0", GO2_WBC_PLAIN=str(int(plain)))
     ours = {folder.name for folder in home.iterdir()}
     for name in [name for name in sys.modules if name.partition(".")[0] in ours]:
         del sys.modules[name]
@@ -105,16 +123,22 @@ def _run_pytest(home: Path, told: Path, command: list[str], limit: int) -> None:
     os._exit(code)
 
 
-def nearest_tests(root: Path, path: str) -> list[str]:
-    """A module's tests: at its place or its folder's, and those of its package that import it."""
-    place, package = Path("tests", path), path.split("/")[0]
-    module = path.removesuffix(".py").replace("/", ".")
+def own_tests(root: Path, path: str) -> list[str]:
+    """Those at a module's place, or its folder's."""
+    place = Path("tests", path)
     named = sorted((root / place.parent).glob(f"test_{place.stem}*.py"))
     named += (root / place.parent.parent).glob(f"test_{place.parent.stem}.py")
-    files = sorted((root / "tests" / package).rglob("test_*.py"))
-    importing = [file for file in files if file not in named and module in file.read_text()]
-    found = [*named, *importing] or sorted((root / place.parent).glob("test_*.py"))
-    return [str(file.relative_to(root)) for file in found]
+    return [str(file.relative_to(root)) for file in named]
+
+
+def nearest_tests(root: Path, path: str) -> list[str]:
+    """A module's own tests, and those of its package that import it; else those of its folder."""
+    module = path.removesuffix(".py").replace("/", ".")
+    files = sorted((root / "tests" / path.split("/")[0]).rglob("test_*.py"))
+    importing = [str(file.relative_to(root)) for file in files if module in file.read_text()]
+    found = list(dict.fromkeys([*own_tests(root, path), *importing]))
+    folder = sorted((root / "tests" / path).parent.glob("test_*.py"))
+    return found or [str(file.relative_to(root)) for file in folder]
 
 
 def _used() -> float:
