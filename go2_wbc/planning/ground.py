@@ -62,8 +62,8 @@ SMOOTH, MOST_RAISE = 0.015, 0.05
 rougher than that is added to the apex of a swing, the latter [m] at most."""
 ROUGH, ROUGH_SPEED, ROUGH_TIME = 0.03, 0.5, 3.0
 """Roughness [m] from which on ground is rough, greatest speed [m/s] there, and for how long [s] it
-is remembered. In curves of 0.85 m/s over boxes of 8 cm, 16 of 40 robots fell, most of them thrown up
-by a foot that came down late; of 16 at 0.47 m/s none did (own simulation)."""
+is remembered. In curves of 0.85 m/s over boxes of 8 cm, 16 of 40 robots fell, many thrown up by a
+foot that came down late; of 16 at 0.47 m/s none did (own simulation)."""
 CALMING = 0.8
 """Share of the roughness that is left after a landing."""
 STUMBLE = 0.06
