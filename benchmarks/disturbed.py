@@ -135,8 +135,9 @@ class Watch:
         stands = height > RISEN and not touches and state.feet_in_contact.sum() >= LEAST_FEET
         self._stands_since = min(self._stands_since, now) if stands else math.inf
         has_stood = now - self._stands_since > STOOD
-        self._has_risen = mode.is_upright and (self._has_risen or has_stood)
-        is_down = self._has_risen and not self.may_lie and touches
+        has_risen = mode.is_upright and not self.may_lie
+        self._has_risen = has_risen and (self._has_risen or has_stood)
+        is_down = self._has_risen and touches
         self._touches_since = min(self._touches_since, now) if is_down else math.inf
         lies = now - self._touches_since > STUMBLE
         if math.isinf(self._fell) and (lies or state.tilt > FALLEN_TILT):

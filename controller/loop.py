@@ -91,7 +91,7 @@ class ControlLoop:
         self._dynamic_wbc = dynamic_wbc or wbc
         self._is_hardware = plant.is_hardware
         self._safety = safety
-        self._falls = FallDetector(safety)
+        self._falls = FallDetector(safety, model.profile)
         self._sag = self._lean = 0.0
         self.fault: Fault | None = None
         self.warn: Callable[..., None] = _log.warning
@@ -151,7 +151,9 @@ class ControlLoop:
                 as the plant still obeys, and the fault is noted; so for any other exception.
         """
         try:
-            if self._observe() and self.plant.motors_obey:
+            # What a limp robot's joint is asked for changes with its speed, also within a tick.
+            is_limp = isinstance(self.behaviour, Damped)
+            if self._observe() and self.plant.motors_obey and not is_limp:
                 acted = self._commands[max(-1 - self.latency.ticks, -len(self._commands))]
                 self._motors.update(acted, self.state, self.plant.control_period)
             self._look_after_parts()

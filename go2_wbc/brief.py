@@ -1,9 +1,10 @@
-"""A value in one line: an object at the prompt, in a list or in a log fills no screen."""
+"""A value in one line, at the prompt, in a list or in a log; and as a page in a notebook."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Collection, Mapping
+from importlib.metadata import entry_points
 
 import numpy as np
 
@@ -28,6 +29,14 @@ def brief(self: object) -> str:
         if field.repr and (isinstance(value, np.ndarray) or value != default):
             words.append(f"{field.name}={told(value)}")
     return cut(f"{type(self).__name__}({', '.join(words)})")
+
+
+def inline_html(self: object) -> str | None:
+    """What a notebook shows of an object, as its ``_repr_html_``; None without a package for it."""
+    for entry in entry_points(group="go2_wbc.inline"):
+        shown: str | None = entry.load()(self)
+        return shown
+    return None
 
 
 def told(value: object) -> str:

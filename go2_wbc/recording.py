@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from go2_wbc.brief import cut
+from go2_wbc.brief import cut, inline_html
 from go2_wbc.errors import ConfigError, MissingDependency
 from go2_wbc.extras import install_line
 from go2_wbc.files import checked_output, write_atomically
@@ -64,6 +64,8 @@ class Recording:
     p_world_com: Float[np.ndarray, "n 3"]
     support_margin: Float[np.ndarray, " n"]
     labels: tuple[str, ...]
+
+    _repr_html_ = inline_html
 
     def __repr__(self) -> str:
         """How long, and what was done."""

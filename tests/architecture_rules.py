@@ -46,7 +46,7 @@ DISTRIBUTIONS = {"pinocchio": "pin", "PIL": "pillow", "collada": "pycollada"}
 """What to install for an import name, where the two differ."""
 
 OPTIONAL = frozenset(
-    {"rclpy", "cyclonedds", "pytest", "crocoddyl", "librosa", "soundfile", "ray", "pyarrow"}
+    {"rclpy", "cyclonedds", "crocoddyl", "librosa", "soundfile", "ray", "pyarrow", "pandas"}
 )
 """Libraries that are imported only by those who have them; their fences keep them apart."""
 

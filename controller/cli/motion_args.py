@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 from go2_wbc.errors import CommandError, unknown_name
 
 if TYPE_CHECKING:
-    from motions import CompiledPlan, FeasibilityReport, Motion, Timeline
+    from controller.cli.progress import ProgressLine
+    from go2_wbc.config import Config
+    from go2_wbc.world import World
+    from motions import CompiledPlan, FeasibilityChecker, FeasibilityReport, Motion, Timeline
     from motions.authoring import Parameter, Value
 
     T = TypeVar("T", Motion, Timeline | CompiledPlan)
@@ -21,6 +24,7 @@ MotionWord = Annotated[str, "MOTION", MOTION_HELP]
 Settings = Annotated[Sequence[str], "NAME=VALUE", "a parameter of the motion; see `go2-wbc list`"]
 Friction = Annotated[float | None, "MU", "of feet and floor"]
 Payload = Annotated[float | None, "KG", "extra mass on the trunk"]
+Sensors = Annotated[str, "WHAT", "what the robot feels: ideal, noisy, or imu for its own sensors"]
 
 
 def meant(words: Sequence[str], settings: Sequence[str]) -> list[Timeline | CompiledPlan]:
@@ -84,6 +88,15 @@ def print_verdict(report: FeasibilityReport) -> None:
     """Print a line about a motion, and one for each limit that it breaks."""
     lines = [report.summary(), *(f"     {finding}" for finding in report.failures)]
     print("\n".join(lines), flush=True)
+
+
+def checker_of(config: Config, world: World, line: ProgressLine) -> FeasibilityChecker:
+    """The check of a robot with these numbers in ``world``; ``line`` shows how solving goes."""
+    from go2_wbc.robot.model import RobotModel
+    from motions import FeasibilityChecker
+
+    model = RobotModel(motor=config.motor)
+    return FeasibilityChecker(model, config.feasibility, world=world, progress=line.solving)
 
 
 class MotionSource:

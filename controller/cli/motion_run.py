@@ -4,18 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from itertools import count
 from typing import TYPE_CHECKING, Annotated
 
 from controller.cli.common import ExitCode, print_json, shown_path
-from controller.cli.motion_args import Friction, MotionWord, Payload, Settings, the_motion
-from controller.cli.options import Html, Json
+from controller.cli.motion_args import (
+    Friction,
+    MotionWord,
+    Payload,
+    Sensors,
+    Settings,
+    checker_of,
+    the_motion,
+)
+from controller.cli.options import Html, Json, Numbers
 from controller.cli.progress import ProgressLine
 from go2_wbc.errors import PlantError, StanceMismatch
 
 if TYPE_CHECKING:
     from controller.go2_controller import GO2Controller
     from controller.motion_measurement import MotionMeasurement
+    from go2_wbc.config import Config
     from go2_wbc.motion_plan import MotionPlan
     from go2_wbc.plant import MujocoPlant
     from go2_wbc.plant.mujoco.ground_truth import GroundTruth
@@ -34,6 +44,9 @@ def run(
     force: Annotated[bool, "play it even if it is infeasible"] = False,
     friction: Friction = None,
     payload: Payload = None,
+    sensors: Sensors = "ideal",
+    seed: Annotated[int, "N", "of sensors and of what the world leaves open"] = 0,
+    config: Numbers = None,
     html: Annotated[Html, "write a 3D replay page, the plan as a ghost"] = None,
     json: Json = False,
 ) -> int:
@@ -45,25 +58,26 @@ def run(
     Examples:
         go2-wbc run high_five
         go2-wbc run wave --set side=left --html wave.html
-        go2-wbc run my_motion.py --friction 0.5
+        go2-wbc run my_motion.py --friction 0.5 --sensors imu --seed 3
         go2-wbc run my_motion.py --force    although the check says no
     """
+    from controller.arguments import config as read_config
     from controller.motion_measurement import measure_motion
     from controller.report_view import performed
     from go2_wbc.plant import plant_in_world
     from go2_wbc.world import World
-    from motions import FeasibilityChecker
     from viz import export_html
 
-    meant, world = the_motion(motion, set), World.of(friction, payload)
+    meant, numbers = the_motion(motion, set), read_config(config)
+    world = replace(World.of(friction, payload), sensors=sensors)
     with ProgressLine(is_quiet=json) as line:
         line.update(0.0, f"checking {meant.name}")
-        checker = FeasibilityChecker(world=world, progress=line.solving)
+        checker = checker_of(numbers, world, line)
         checked = checker.evaluate(meant)
     plan, report = checked.plan, checked.report
     if not force:
         report.raise_if_infeasible()
-    with getting_ready(plan, plant_in_world(world), line) as (go2, truth):
+    with getting_ready(plan, plant_in_world(world, seed=seed), line, numbers) as (go2, truth):
         result = measure_motion(go2, truth, plan, checker.model)
         recording = go2.recording()
     if json:
@@ -80,7 +94,7 @@ def run(
 
 @contextmanager
 def getting_ready(
-    plan: MotionPlan, plant: MujocoPlant, line: ProgressLine
+    plan: MotionPlan, plant: MujocoPlant, line: ProgressLine, config: Config | None = None
 ) -> Iterator[tuple[GO2Controller, GroundTruth]]:
     """A robot that has got ready for a plan, with the truth; ``line`` tells how far it has come.
 
@@ -100,7 +114,11 @@ def getting_ready(
             share = min(time / (GETTING_READY + plan.duration), 1.0)
             line.update(share, f"{plan.name}, {time:.1f} s")
 
-    with line, closing(GroundTruth(plant)) as truth, GO2Controller(plant=truth) as go2:
+    with (
+        line,
+        closing(GroundTruth(plant)) as truth,
+        GO2Controller(plant=truth, config=config) as go2,
+    ):
         truth.on_tick = tell
         starts = {Posture.STAND: go2.stand, Posture.SIT: go2.sit}
         if plan.entry not in starts:

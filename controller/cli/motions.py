@@ -22,11 +22,12 @@ from controller.cli.motion_args import (
     MotionWord,
     Payload,
     Settings,
+    checker_of,
     meant,
     print_verdict,
     the_motion,
 )
-from controller.cli.options import Json, output
+from controller.cli.options import Json, Numbers, output
 from controller.cli.progress import ProgressLine
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.files import checked_output, write_atomically
@@ -140,6 +141,7 @@ def check(
     fix: Annotated[bool, "look for the least change that makes a refused motion feasible"] = False,
     friction: Friction = None,
     payload: Payload = None,
+    config: Numbers = None,
     json: Json = False,
 ) -> int:
     """Check motions: can the robot do them? Nothing is simulated.
@@ -156,15 +158,16 @@ def check(
         go2-wbc check my_motion.py --fix  what would make it feasible
         go2-wbc check bow --json          the same for a program to read
     """
+    from controller.arguments import config as read_config
     from go2_wbc.world import World
-    from motions import FeasibilityChecker, suggest
+    from motions import suggest
 
     lines = meant(motion, set)
     reports: list[FeasibilityReport] = []
     changes: dict[str, Sequence[Suggestion]] = {}
     with ProgressLine(is_quiet=json) as progress:
         world = World.of(friction, payload)
-        checker = FeasibilityChecker(world=world, progress=progress.solving)
+        checker = checker_of(read_config(config), world, progress)
         for number, line in enumerate(lines):
             progress.update(number / len(lines), line.name)
             reports.append(checker.check(line))

@@ -16,7 +16,7 @@ from controller.sweeps.local import LocalEngine, processors
 from controller.sweeps.rows import SEED, Columns, Row
 from controller.sweeps.sweep_file import SweepFile
 from controller.sweeps.targets import target_of
-from go2_wbc.brief import brief
+from go2_wbc.brief import brief, inline_html
 from go2_wbc.errors import CommandError, SweepError, unknown_name
 
 FOLDER = Path("out/sweeps")
@@ -71,6 +71,7 @@ class SweepResult:
     failures: dict[int, str]
     about: dict[str, str]
 
+    _repr_html_ = inline_html
     __repr__ = brief
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 
-from go2_wbc.brief import brief, cut
+from go2_wbc.brief import brief, cut, inline_html
 from go2_wbc.errors import MotionInfeasible
 from go2_wbc.world import World
 from motions.feasibility.goal_errors import Departure
@@ -176,6 +176,8 @@ class FeasibilityReport:
     world: World
     end_pose: tuple[float, float, float] | None = None
     departures: tuple[Departure, ...] = ()
+
+    _repr_html_ = inline_html
 
     def __repr__(self) -> str:
         """The verdict."""

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self, TypeVar
 
+from go2_wbc.brief import inline_html
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
@@ -70,6 +71,8 @@ class TimelineData:
     counted_from: float = field(default=0.0, kw_only=True)
     last_start: float = field(default=0.0, kw_only=True)
     floor: float = field(default=0.0, kw_only=True)
+
+    _repr_html_ = inline_html
 
     def __repr__(self) -> str:
         """Its name, length and ends."""

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.interpolate import PPoly
 
+from go2_wbc.brief import inline_html
 from go2_wbc.contacts import TIE, ContactPhase, ContactSchedule
 from go2_wbc.errors import MotionError
 from go2_wbc.legs import Leg
@@ -118,6 +119,8 @@ class CompiledPlan(MotionPlan):
     dynamic: tuple[DynamicSpan, ...] = ()
     held: Mapping[str, Leg] = field(default_factory=dict)
     _asked: PlanCurves = field(init=False, repr=False)
+
+    _repr_html_ = inline_html
 
     def __repr__(self) -> str:
         """Its name, length and ends."""

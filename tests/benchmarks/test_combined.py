@@ -40,6 +40,15 @@ def test_a_walk_on_ice_is_not_done(friction: float, share: float) -> None:
     assert len(found.notes) == 1.0 - share
 
 
+def test_a_long_run_tells_what_was_done_and_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in (("CIRCLES", 0.4), ("FULL_AFTER", 0.2), ("FIVES", 1)):
+        monkeypatch.setattr(combined, name, value)
+    found = TrialResult()
+    combined.measure_long(Trial(0), found)
+    assert (found.values["circles"], found.values["fives"]) == (1.0, 1.0)
+    assert abs(found.values["memory"]) < 500.0
+
+
 def test_each_study_stands_once_and_once_on_sensors() -> None:
     names = [study.name for study in STUDIES]
-    assert len(set(names)) == len(names) == 2 * (len(RESTING) + 20 + 1)
+    assert len(set(names)) == len(names) == 2 * (len(RESTING) + 20 + 2)

@@ -36,13 +36,17 @@ def export_html(shown: Recording | ReplayContent, path: Path, *, title: str) -> 
         DescriptionError: if the robot's files are missing.
     """
     target = checked_output(path, HTML_SUFFIXES)
-    content = checked_content(shown)
-    page = page_text(title, scene_text(), content_text(content, title)).encode()
-    if len(page) > PAGE_LIMIT:
+    return write_atomically(target, replay_html(shown, title=title).encode())
+
+
+def replay_html(shown: Recording | ReplayContent, *, title: str) -> str:
+    """The page of ``export_html`` as text; raises as it does, but for the path."""
+    page = page_text(title, scene_text(), content_text(checked_content(shown), title))
+    if (size := len(page.encode())) > PAGE_LIMIT:
         raise ConfigError(
-            f"the page would have {len(page)} bytes, limit {PAGE_LIMIT}; record a shorter run"
+            f"the page would have {size} bytes, limit {PAGE_LIMIT}; record a shorter run"
         )
-    return write_atomically(target, page)
+    return page
 
 
 def page_text(title: str, scene: str, data: str, *, is_live: bool = False) -> str:

@@ -108,6 +108,16 @@ def test_a_world_is_asked_for_by_its_friction_and_payload(run: Run) -> None:
     assert "That holds for friction 0.05, payload 2 kg." in said.out
 
 
+def test_the_numbers_of_a_file_count_in_a_check(tmp_path: Path, run: Run) -> None:
+    numbers = tmp_path / "go2.toml"
+    numbers.write_text("[feasibility]\ntorque_share = 0.1\n")
+    assert "ok" in run("check", "nod").out
+    assert "torque" in run("check", "nod", "--config", numbers, code=ExitCode.FAILED).out
+    numbers.write_text("[wbc]\nfriction = 900\n")
+    said = run("check", "nod", "--config", numbers, code=ExitCode.USAGE).err
+    assert "WbcConfig.friction must be between 0.0001 and 2, got 900" in said
+
+
 def test_check_gives_json_with_every_margin(run: Run) -> None:
     (report,) = json.loads(run("check", "high_five", "--set", "side=left", "--json").out)
     assert report["ok"]

@@ -1,0 +1,79 @@
+"""What a notebook shows of objects."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from controller.inline import LONGEST, html_of
+from controller.sweeps.rows import Row
+from controller.sweeps.run import SweepResult
+from go2_wbc import brief
+from go2_wbc.recording import Recording
+from motions import CheckedMotion, FeasibilityChecker, Timeline, load_motion
+from tests.viz.replay.browsing import chromium
+
+LARGEST = 1_200_000
+"""Of ten seconds of a motion [bytes]."""
+
+
+@pytest.fixture(scope="module")
+def checked() -> CheckedMotion:
+    return FeasibilityChecker().evaluate(load_motion("wave").hold(3.6))
+
+
+def test_a_motion_of_ten_seconds_is_a_page_that_draws_the_robot(
+    checked: CheckedMotion, tmp_path: Path
+) -> None:
+    shown = html_of(checked)
+    assert shown
+    assert len(shown.encode()) < LARGEST
+    assert "the robot can do it" in shown
+    (tmp_path / "notebook.html").write_text(f"<html><body>{shown}</body></html>")
+    with chromium() as browser:
+        page, errors = browser.new_page(), list[str]()
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.goto((tmp_path / "notebook.html").as_uri())
+        inside = page.frames[1]
+        inside.wait_for_selector("canvas")
+        inside.get_by_text("On four feet").first.wait_for()
+        assert inside.evaluate("document.querySelector('canvas').width") > 200
+        assert not errors
+
+
+def test_a_report_is_a_table_with_the_margins_as_a_picture(checked: CheckedMotion) -> None:
+    shown = html_of(checked.report)
+    assert shown
+    assert "<pre>check " in shown
+    assert 'src="data:image/png;base64,' in shown
+
+
+def test_a_sweep_is_a_table_and_a_recording_a_page(checked: CheckedMotion) -> None:
+    assert "<iframe" in (html_of(checked.recording()) or "")
+    columns = {"seed": "int", "ok": "bool", "speed": "float"}
+    rows: list[Row] = [{"seed": seed, "ok": seed > 0, "speed": 0.5 * seed} for seed in range(3)]
+    shown = html_of(SweepResult(Path("a.sqlite"), "trot", columns, rows, {}, {})) or ""
+    assert "<th>ok</th><td>2 of 3</td>" in shown
+    assert "<th>speed</th><td>0.5</td>" in shown
+
+
+def test_what_has_no_page_is_left_to_its_line(checked: CheckedMotion) -> None:
+    run = checked.recording()
+    long = Recording(
+        run.time * LONGEST,
+        *(getattr(run, field.name) for field in fields(run)[1:]),
+    )
+    assert html_of(long) is None
+    assert html_of(Timeline()) is None
+    assert html_of(5) is None
+
+
+def test_objects_find_their_page_by_an_entry_point() -> None:
+    root = Path(__file__).parents[2]
+    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["entry-points"]["go2_wbc.inline"] == {"html": "controller.inline:html_of"}
+    for kind in (Timeline, CheckedMotion, Recording):
+        assert kind._repr_html_ is brief.inline_html
