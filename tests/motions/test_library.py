@@ -115,6 +115,13 @@ def test_the_paw_is_held_for_the_time_asked_for(model: RobotModel, hold: float) 
     assert (plan.entry, plan.exit) == (Posture.STAND, Posture.STAND)
 
 
+def test_the_ends_of_a_range_are_within_it() -> None:
+    for parameter in find_motion("high_five").parameters:
+        if not isinstance(parameter.valid, Choice):
+            assert parameter.check(parameter.valid.low) == parameter.valid.low
+            assert parameter.check(parameter.valid.high) == parameter.valid.high
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [
