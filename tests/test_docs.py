@@ -257,6 +257,7 @@ def test_the_limits_in_the_table_are_those_of_the_checker() -> None:
         f"calves >= {1000 * limits.calf_clearance:g} mm",
         "dragging": f"<= {1000 * limits.drag:g} mm",
         "landing place": f"<= {1000 * limits.landing:g} mm",
+        "flat landing": f"<= {1000 * limits.flat_landing:g} mm",
         "landing speed": f"<= {limits.landing_speed:g} m/s",
         "continuity": f"<= {limits.body_jump:g}, {limits.turn_jump:g}, {limits.joint_jump:g}",
         "entry and exit": f"<= {limits.stance_position:g} m, {limits.stance_angle:g} rad, "

@@ -274,7 +274,7 @@ class FeasibilityChecker:
         lacks = wrench.worst(0, begin=dynamics.SPREAD) > limits.jolt
         is_lacking = lag.is_broken or (slides and lacks)
         grip = dynamics.friction(case)
-        landing_place, landing_speed = kinematic.landing(case)
+        landing_place, flat_landing, landing_speed = kinematic.landing(case)
         return [
             *_missed(problems, limits),
             kinematic.reach(case),
@@ -283,6 +283,7 @@ class FeasibilityChecker:
             kinematic.clearance(case, self._hulls),
             kinematic.dragging(case),
             landing_place,
+            flat_landing,
             kinematic.ends(case, plan),
             *(_failed(problem) for problem in problems if is_off and problem.check == "balance"),
             com,

@@ -105,6 +105,7 @@ CAUSES = (
         "clearance",
         "dragging",
         "landing place",
+        "flat landing",
         "entry and exit",
     ),
     ("balance", "support"),
@@ -171,6 +172,7 @@ AWAY = {
     .home(over=0.9),
     "support": Timeline(balance=False).foot("FR", z=0.1, over=0.8).home(over=0.8),
     "landing speed": Timeline().foot("FR", z=0.15, over=0.6).foot("FR", over=0.1, ease="linear"),
+    "flat landing": Timeline().foot("RR", x=-0.12, z=0.02, over=0.4).home(over=0.3),
     "dragging": Timeline()
     .foot("FR", x=0.1, z=0.0, over=0.6)
     .foot("FR", x=-0.1, z=0.0, over=0.6)
