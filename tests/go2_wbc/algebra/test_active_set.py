@@ -26,7 +26,8 @@ def random_qp(seed: int, equalities: int) -> Qp:
 
 def solved(*qp: np.ndarray) -> np.ndarray:
     x = np.empty(N)
-    assert solve_qp(*qp, x) == SOLVED
+    H, g, E, e, C, lower, upper = qp
+    assert solve_qp(H, g, E, e, C, lower, upper, x) == SOLVED
     return x
 
 
