@@ -461,11 +461,12 @@ def measure_sequence(
     seed = first_seed + trial.seed
     rng = np.random.default_rng((seed, WORLDS.index(world)))
     calls: list[Call] = []
-    with TrialRobot(world.plant(seed)) as robot, suppress(_Hangs):
+    with TrialRobot(world.plant(seed)) as robot:
         judge = Judge(robot, world.room)
-        while len(calls) < CALLS:
-            calls.append(drawn(rng, robot.go2.mode, world.gaits))
-            judge.make(calls[-1])
+        with suppress(_Hangs):
+            while len(calls) < CALLS:
+                calls.append(drawn(rng, robot.go2.mode, world.gaits))
+                judge.make(calls[-1])
     found.values |= {name: float(len(wrong)) for name, wrong in judge.found.items()}
     found.failures |= {name: "; ".join(wrong) for name, wrong in judge.found.items() if wrong}
     found.notes["calls"] = " | ".join(map(str, calls))
