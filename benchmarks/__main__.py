@@ -26,6 +26,8 @@ COMMANDS: tuple[Command, ...] = (
     Command("dynamic_motions", "benchmarks.dynamic_motions", "jumps, hops and rears in physics"),
     Command("probability", "benchmarks.probability", "is the stated chance the one that it has?"),
     Command("false_negatives", "benchmarks.false_negatives", "do motions that passed fall?"),
+    Command("adversary", "benchmarks.adversary", "a search for motions that pass and fail"),
+    Command("border", "benchmarks.border", "verdict and chance at the border of what is done"),
     Command("nearest", "benchmarks.nearest", "the nearest to motions that the check refuses"),
     Command("solve", "benchmarks.solved_plans", "solve the library's dynamic plans, to ship them"),
     Command("gallery", "benchmarks.gallery", "play the library's motions, write their pictures"),

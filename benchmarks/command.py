@@ -188,6 +188,7 @@ def run_sweep(
     trial: Callable[[int], object],
     n: int,
     *,
+    first_seed: int = 0,
     is_enough: Callable[[Sequence[Row]], bool] | None = None,
 ) -> SweepResult:
     """Run those of ``n`` seeds whose rows are not kept yet, and tell of the progress.
@@ -204,6 +205,7 @@ def run_sweep(
         raise ConfigError(f"cannot make the folder of {rows}: {error.strerror}") from error
     with ProgressLine() as line:
         options = {"workers": args.jobs, "out": rows, "keep_going": True, "is_enough": is_enough}
+        options["first_seed"] = first_seed
         return sweep(trial, n, **options, on_progress=lambda progress: tell(line, progress))
 
 

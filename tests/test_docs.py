@@ -19,7 +19,7 @@ from go2_wbc.config import Config, load_config
 from go2_wbc.curves import Ease
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.motion_plan import Posture
-from go2_wbc.robot.motor import KNEE_SHARE
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.wbc.config import Gains
 from go2_wbc.world import World
 from motions import FeasibilityChecker, Timeline, check, compile_timeline, load_motion
@@ -40,6 +40,8 @@ from tests.pages import (
     table_rows,
     words_of,
 )
+
+KNEE_SHARE = find_profile().knee_share
 
 TUTORIAL, LANGUAGE, FEASIBILITY = (
     f"docs/{name}.md" for name in ("tutorial", "motions", "feasibility")
@@ -255,6 +257,7 @@ def test_the_limits_in_the_table_are_those_of_the_checker() -> None:
         f"calves >= {1000 * limits.calf_clearance:g} mm",
         "dragging": f"<= {1000 * limits.drag:g} mm",
         "landing place": f"<= {1000 * limits.landing:g} mm",
+        "flat landing": f"<= {1000 * limits.flat_landing:g} mm",
         "landing speed": f"<= {limits.landing_speed:g} m/s",
         "continuity": f"<= {limits.body_jump:g}, {limits.turn_jump:g}, {limits.joint_jump:g}",
         "entry and exit": f"<= {limits.stance_position:g} m, {limits.stance_angle:g} rad, "

@@ -1,14 +1,17 @@
 """What would make a refused motion feasible: the least change of tempo, size, height or shifts.
 
 Each kind of change is a call that the author can append to the motion. Its number is searched on a
-grid as coarse as what is printed: up a ladder until the check passes, then by bisection between the
-last number that was refused and the first that was not. So what is suggested is what was checked.
+grid as coarse as what is printed: up a ladder until the check passes at a chance of ``AIM``, then
+by bisection between the last number that did not and the first that did. So what is suggested is
+what was checked, and not the border of what can be done, beside which half of all motions fail.
+Where no change leads as far inside, those that just pass are better than none.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from go2_wbc.brief import brief
@@ -17,6 +20,10 @@ from motions.feasibility.check import FeasibilityChecker, Playable, timeline_of
 from motions.feasibility.report import FeasibilityReport
 from motions.language.keys import BalanceShift
 from motions.language.timeline import Timeline
+
+_ReportOf = Callable[[Timeline], FeasibilityReport | None]
+AIM = 0.9
+"""Least chance of what is suggested."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,23 +153,29 @@ def suggest(
             "suggest() needs a motion as it is written, a name, a function with @motion before it "
             f"or a Timeline, got {type(motion).__name__}"
         )
-    if _report(line, checker) is not None:
+
+    @cache
+    def report_of(changed: Timeline) -> FeasibilityReport | None:
+        return _report(changed, checker)
+
+    if report_of(line) is not None:
         return ()
-    alone = [_least(line, kind, checker) for kind in (TEMPO, AMPLITUDE, HIGHER, LOWER, SHIFT_TIME)]
-    found = [one for one in alone if one is not None]
-    if not found:
-        found = [one for one in [_least(line, BOTH, checker)] if one is not None]
-    return tuple(sorted(found, key=lambda one: one.change))
+    for aim in (AIM, 0.0):
+        for kinds in ((TEMPO, AMPLITUDE, HIGHER, LOWER, SHIFT_TIME), (BOTH,)):
+            found = [_least(line, kind, report_of, aim) for kind in kinds]
+            if some := [one for one in found if one is not None]:
+                return tuple(sorted(some, key=lambda one: one.change))
+    return ()
 
 
-def _least(line: Timeline, kind: _Kind, checker: FeasibilityChecker) -> Suggestion | None:
-    """The least change of one kind after which ``line`` passes, if there is any."""
+def _least(line: Timeline, kind: _Kind, report_of: _ReportOf, aim: float) -> Suggestion | None:
+    """The least change of one kind after which ``line`` passes at a chance of ``aim``, if any."""
     if kind is SHIFT_TIME and not any(isinstance(key, BalanceShift) for key in line.keys):
         return None
 
     def tried(steps: int) -> Suggestion | None:
         changed = kind.apply(line, steps)
-        if (report := _report(changed, checker)) is None:
+        if (report := report_of(changed)) is None or report.probability < aim:
             return None
         meaning = kind.meaning.format(steps=steps, lasts=report.duration)
         share = steps / kind.ladder[-1]

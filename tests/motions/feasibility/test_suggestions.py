@@ -17,7 +17,15 @@ from motions import (
     deg,
     suggest,
 )
-from motions.feasibility.suggestions import AMPLITUDE, BOTH, HIGHER, LOWER, SHIFT_TIME, TEMPO
+from motions.feasibility.suggestions import (
+    AIM,
+    AMPLITUDE,
+    BOTH,
+    HIGHER,
+    LOWER,
+    SHIFT_TIME,
+    TEMPO,
+)
 
 CHECKER = FeasibilityChecker()
 FAST_TWIST = Timeline(name="twist").body(yaw=deg(25), over=0.12).home(over=0.12)
@@ -50,13 +58,14 @@ def test_what_is_pasted_is_feasible_and_is_what_was_checked(line: Timeline) -> N
 
 
 @pytest.mark.parametrize("line", [FAST_TWIST, TALL, HASTY_PAW, SWAY], ids=lambda line: line.name)
-def test_one_step_less_is_refused(line: Timeline) -> None:
+def test_one_step_less_is_refused_or_nearer_to_the_border(line: Timeline) -> None:
     for one in _found(line):
         kinds = [kind for kind in (TEMPO, AMPLITUDE, SHIFT_TIME, BOTH) if kind.name == one.kind]
         kinds = kinds or [LOWER if "(-" in one.call else HIGHER]
         steps = round(one.change * kinds[0].ladder[-1])
         assert kinds[0].apply(line, steps) == one.motion
-        assert steps == 1 or not CHECKER.check(kinds[0].apply(line, steps - 1)).ok
+        less = CHECKER.check(kinds[0].apply(line, steps - 1))
+        assert steps == 1 or not less.ok or less.probability < AIM <= one.report.probability
 
 
 def test_each_kind_is_found_where_it_helps() -> None:

@@ -1,0 +1,153 @@
+"""``python -m benchmarks border``: verdict and chance on motions of another generator.
+
+Motions are those of the adversary's families, which no limit and no fit has seen: each as it is
+drawn, and two beside the size at which physics changes its mind, which is bisected by playing. The
+border is where a verdict is hard, and where a search leads.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from benchmarks.adversary import FIRST, checker, outcome
+from benchmarks.adversary_motions import COUNT, FAMILIES, Numbers
+from benchmarks.command import add_sweep, positive, publish, run_sweep
+from benchmarks.probability_fit import calibration
+from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.sweeps.rows import Row
+from go2_wbc.errors import MotionError
+from go2_wbc.motion_plan import MotionPlan
+
+MOTIONS = 120
+RANDOM, BESIDE = "random", "border"
+SMALLEST, LARGEST, STEP, NEAR = 0.15, 2.5, 1.5, 1.1
+"""Sizes between which a border is looked for, ratio of those that are tried, and at the end."""
+BELOW, ABOVE = (0.8, 0.95), (1.05, 1.25)
+"""Sizes of the two motions beside a border, over its own."""
+ERROR = "calibration error"
+BARS = {ERROR: 0.05, "random": 0.95, "border": 0.85, "refused": 0.7}
+"""Greatest error; least shares of passes that are done, and of refusals at the border that fail."""
+NAMES = {
+    RANDOM: "random motions that pass are done",
+    BESIDE: "border motions that pass are done",
+    "refused": "border motions that are refused go wrong",
+    ERROR: "expected calibration error, all",
+}
+EXAMPLES = """
+python -m benchmarks border             120 motions: 20 minutes, 2 cores
+python -m benchmarks border --motions 12
+python -m benchmarks border --first 0   seeds to mend the check by
+"""
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``border``."""
+    parser = add_parser(
+        subparsers,
+        "border",
+        "Verdict and chance on motions of the adversary's families, as they are drawn\n"
+        "and beside the size at which physics changes its mind. Goes on where it was\n"
+        "interrupted. Exit code 0 if every bar is met, else 1.",
+        examples=EXAMPLES,
+    )
+    parser.add_argument(
+        "--motions", metavar="N", type=positive, default=MOTIONS, help="default %(default)s"
+    )
+    parser.add_argument(
+        "--first", metavar="SEED", type=int, default=FIRST, help="default %(default)s"
+    )
+    add_sweep(parser, jobs=2)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Ask what is not kept yet, and judge."""
+    result = run_sweep(args, asked, args.motions, first_seed=args.first)
+    shares, bins = measured(result.rows)
+    is_ok = are_met(shares) and not result.failures
+    values = {"passed": is_ok, "shares": shares, "bins": bins, "lost": result.failures}
+    publish(args, values, render(shares, bins))
+    return ExitCode.OK if is_ok else ExitCode.FAILED
+
+
+def asked(seed: int) -> dict[str, object]:
+    """The row of a seed: what was said of its motions, and what became of them (JSON)."""
+    rng = np.random.default_rng([seed, 7])
+    family, numbers = list(FAMILIES)[seed % len(FAMILIES)], rng.random(COUNT).tolist()
+    sizes = [(RANDOM, 1.0)]
+    if (size := border_of(family, numbers)) is not None:
+        sizes += [(BESIDE, size * rng.uniform(*share)) for share in (BELOW, ABOVE)]
+    found = [(kind, *_said_and_done(family, numbers, size)) for kind, size in sizes]
+    return {"family": family, "border": size or 0.0, "motions": json.dumps(found)}
+
+
+def border_of(family: str, numbers: Sequence[float]) -> float | None:
+    """The size at which physics changes its mind, if there is one; the check is not asked."""
+    done, failed, size = SMALLEST, LARGEST, 1.0
+    is_low_done = is_high_failed = False
+    while not (is_low_done and is_high_failed) or failed / done > NEAR:
+        plan = _plan(family, numbers, size)
+        if plan is not None and not outcome(plan)[0]:
+            done, is_low_done = size, True
+        else:
+            failed, is_high_failed = size, True
+        if is_low_done and is_high_failed:
+            size = math.sqrt(done * failed)
+        elif size in (SMALLEST, LARGEST):
+            return None
+        else:
+            size = min(max(size * STEP if is_low_done else size / STEP, SMALLEST), LARGEST)
+    return math.sqrt(done * failed)
+
+
+def _plan(family: str, numbers: Sequence[float], size: float) -> MotionPlan | None:
+    """The plan of a motion; none if it cannot be written."""
+    try:
+        return checker().plan(FAMILIES[family](Numbers(numbers, size)), check=False)
+    except MotionError:
+        return None
+
+
+def _said_and_done(family: str, numbers: Sequence[float], size: float) -> tuple[bool, float, bool]:
+    """Whether a motion passes, at which chance, and whether physics does it."""
+    plan = _plan(family, numbers, size)
+    if plan is None:
+        return False, 0.0, False
+    report = checker().check(plan)
+    return report.ok, report.probability, not outcome(plan)[0]
+
+
+Shares = dict[str, tuple[float, int]]
+"""By the names of ``BARS``: what was measured, and of how many motions."""
+Bins = tuple[tuple[float, float, int], ...]
+
+
+def measured(rows: Sequence[Row]) -> tuple[Shares, Bins]:
+    """Every share, and the bins of the calibration."""
+    said = [(row["seed"], *one) for row in rows for one in json.loads(str(row["motions"]))]
+    found: dict[str, list[bool]] = {
+        kind: [done for _, of, ok, _, done in said if of == kind and ok]
+        for kind in (RANDOM, BESIDE)
+    }
+    found["refused"] = [not done for _, of, ok, _, done in said if of == BESIDE and not ok]
+    shares = {k: (float(np.mean(v)) if v else math.nan, len(v)) for k, v in found.items()}
+    chances, done = (np.array([one[k] for one in said]) for k in (3, 4))
+    error = calibration(chances, done, [str(one[0]) for one in said])
+    return {**shares, ERROR: (error.error, len(said))}, error.bins
+
+
+def are_met(shares: Shares) -> bool:
+    """Whether all bars are."""
+    return all(x <= BARS[k] if k == ERROR else x >= BARS[k] for k, (x, _) in shares.items())
+
+
+def render(shares: Shares, bins: Bins) -> str:
+    """The shares and the reliability, at most 80 columns wide."""
+    lines = [f"{'':<44}{'share':>8}{'bar':>7}{'n':>7}", "-" * 80]
+    lines += [f"{NAMES[k]:<44}{x:>8.3f}{BARS[k]:>7.2f}{n:>7}" for k, (x, n) in shares.items()]
+    lines += [f"stated {chance:.2f}, done {share:.2f} of {count}" for chance, share, count in bins]
+    return "\n".join([*lines, "-" * 80, "every bar met: " + ("ok" if are_met(shares) else "NO")])
