@@ -19,8 +19,8 @@ from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.rotations import wrap_angle
-from motions.postures import STAND_HEIGHT
 
 STAND = (
     ("time", "time", "<= 3 s"),
@@ -85,7 +85,8 @@ def measure_stand(trial: Trial, found: TrialResult) -> None:
         found.values = {
             "time": robot.plant.time - start,
             "torque": float(recorded.torque_shares(RobotModel()).max()),
-            "height": 1000.0 * abs(float(recorded.p_world_com[-1, 2]) - STAND_HEIGHT),
+            "height": 1000.0
+            * abs(float(recorded.p_world_com[-1, 2]) - find_profile().stand_height),
             "tilt": math.degrees(robot.plant.truth().tilt),
         }
         if failure := standing_failure(robot):

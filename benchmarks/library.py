@@ -22,7 +22,8 @@ from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.reference import Anchor
-from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.rotations import wrap_angle
 from motions import compile_timeline, load_motion, motion_names
 
@@ -129,9 +130,10 @@ class Ending:
 
 def ending(recorded: TruthRecording, plan: MotionPlan) -> Ending:
     """The ending of a ``plan`` that was played while ``recorded`` was."""
-    begun, ended = (Anchor.of_feet(recorded.p_world_feet[k].copy(), FOOT_RADIUS) for k in (0, -1))
+    radius = find_profile().foot_radius
+    begun, ended = (Anchor.of_feet(recorded.p_world_feet[k].copy(), radius) for k in (0, -1))
     planned = plan.at(plan.duration).placed(begun).p_world_feet
-    wanted = Anchor.of_feet(planned, FOOT_RADIUS)
+    wanted = Anchor.of_feet(planned, radius)
     off = (ended.p_world - wanted.p_world)[:2]
     way = (wanted.p_world - begun.p_world)[:2]
     turned = abs(wrap_angle(ended.yaw - wanted.yaw))

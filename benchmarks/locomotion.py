@@ -41,7 +41,7 @@ from controller.sweeps.studies import set_off
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
-from go2_wbc.planning.envelopes import TROT
+from go2_wbc.planning.envelopes import trot_of
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.robot.model import RobotModel
@@ -111,7 +111,7 @@ def speed_of(command: VelocityCommand) -> float:
 def measure_run(trial: Trial, found: TrialResult, run: Run) -> None:
     """Follow the command; see the module's docstring for what is measured."""
     plant, config = plant_of(trial, FIRST_SEED, UNTOLD), None
-    if speed_of(run.command) > TROT.forward:
+    if speed_of(run.command) > trot_of().forward:
         config = BEYOND
     mass = plant.total_mass
     with TrialRobot(plant, config) as robot:

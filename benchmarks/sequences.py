@@ -42,10 +42,11 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TOUCH, TruthRecording
 from go2_wbc.plant.terrain import Boxes, Slope
 from go2_wbc.reference import Anchor
-from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from motions import CompiledPlan, compile_timeline, load_motion
-from motions.postures import STAND_HEIGHT
 
+FOOT_RADIUS, STAND_HEIGHT = find_profile().foot_radius, find_profile().stand_height
 FIRST_SEED = 9000
 """Seed of the first trial that is judged."""
 CALLS = 7
@@ -461,11 +462,12 @@ def measure_sequence(
     seed = first_seed + trial.seed
     rng = np.random.default_rng((seed, WORLDS.index(world)))
     calls: list[Call] = []
-    with TrialRobot(world.plant(seed)) as robot, suppress(_Hangs):
+    with TrialRobot(world.plant(seed)) as robot:
         judge = Judge(robot, world.room)
-        while len(calls) < CALLS:
-            calls.append(drawn(rng, robot.go2.mode, world.gaits))
-            judge.make(calls[-1])
+        with suppress(_Hangs):
+            while len(calls) < CALLS:
+                calls.append(drawn(rng, robot.go2.mode, world.gaits))
+                judge.make(calls[-1])
     found.values |= {name: float(len(wrong)) for name, wrong in judge.found.items()}
     found.failures |= {name: "; ".join(wrong) for name, wrong in judge.found.items() if wrong}
     found.notes["calls"] = " | ".join(map(str, calls))

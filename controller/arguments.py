@@ -11,6 +11,7 @@ from typing import TypeVar
 from go2_wbc.config import Config, load_config
 from go2_wbc.errors import ConfigError, Go2WbcError
 from go2_wbc.plant.base import Plant
+from go2_wbc.robot.profile import GO2
 from go2_wbc.wbc.tasks import Task
 
 NAMESPACE = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
@@ -63,15 +64,25 @@ def namespace(value: str) -> str:
     return value
 
 
-def config(value: Config | Path | str | None) -> Config:
-    """The configuration meant: itself, that of a TOML file, or the default.
+def config(
+    value: Config | Path | str | None, robot: str | None = None, plant: Plant | None = None
+) -> Config:
+    """The configuration meant: itself, that of a TOML file, or the one of the robot.
+
+    That is ``robot`` or the one of the ``plant``, or else a Go2.
 
     Raises:
-        ConfigError: if it is none of these, or the file is wrong.
+        ConfigError: if it is none of these, the file is wrong, or they are of different robots.
     """
+    asked = checked("robot", robot, str | None, "the name of a robot")
+    is_of = GO2 if plant is None else plant.robot
     if value is None:
-        return Config()
-    if isinstance(value, Config):
-        return value
-    what = "a Config or the path of a TOML file"
-    return load_config(checked("config", value, Path | str, what))
+        value = Config.of_robot(asked or is_of)
+    if not isinstance(value, Config):
+        what = "a Config or the path of a TOML file"
+        value = load_config(checked("config", value, Path | str, what))
+    known = {"robot": asked, "plant": plant and is_of, "config": value.robot}
+    if len({name for name in known.values() if name is not None}) > 1:
+        told = ", ".join(f"{what} says {name!r}" for what, name in known.items() if name)
+        raise ConfigError(f"of which robot? {told}; Config.of_robot(...) has a robot's numbers")
+    return value

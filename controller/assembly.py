@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,8 @@ from go2_wbc.compilation import load_kernels
 from go2_wbc.config import Config
 from go2_wbc.lazy import without_collecting
 from go2_wbc.plant.base import Plant
-from go2_wbc.robot.description import RobotDescription
+from go2_wbc.plant.friction_identification import VISCOUS_SHARE
+from go2_wbc.robot.description import RobotDescription, find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload_estimation import PayloadEstimator
 from go2_wbc.wbc.controller import WholeBodyController
@@ -50,7 +52,7 @@ def build_pilot(
         realtime: let time pass in a background thread at wall-clock pace.
         viewer: open MuJoCo's window, if there is a display.
         recorded_time: robot time [s] that the telemetry keeps; 0 keeps the last tick.
-        description: what the controller takes the robot for; by default the installed Go2.
+        description: what the controller takes the robot for; by default the installed one.
         after_tick: is called after every tick, in the thread that ticks.
         extra_tasks: a user's own tasks of the whole-body QP.
 
@@ -64,7 +66,8 @@ def build_pilot(
         config = config.beside_hardware
     with without_collecting():
         load_kernels()
-    model = RobotModel(description, motor=config.motor)
+    config = _with_damping(config, plant)
+    model = RobotModel(description or find_description(robot=config.robot), motor=config.motor)
     wbc, dynamic_wbc = (
         WholeBodyController(model, config.backend, numbers, extra_tasks=extra_tasks)
         for numbers in (config.wbc, config.wbc.for_dynamics)
@@ -87,6 +90,20 @@ def build_pilot(
         pilot = Pilot(runner, config)
         pilot.close = opened.pop_all().close
     return pilot
+
+
+def _with_damping(config: Config, plant: Plant) -> Config:
+    """``config`` with the friction that the plant's description tells, unless it has its own.
+
+    A leg of 0.3 kg at the foot that meets 2 N m s/rad is slowed down by 100 1/s: without it no foot
+    would swing to its place in time.
+    """
+    own = config.wbc.joint_friction
+    if any(own.viscous) or not any(plant.joint_damping):
+        return config
+    viscous = tuple(VISCOUS_SHARE * damping for damping in plant.joint_damping)
+    friction = replace(own, viscous=viscous)
+    return replace(config, wbc=replace(config.wbc, joint_friction=friction))
 
 
 def _shown(window: PlantViewer, loop: ControlLoop, after_tick: Callable[[], None]) -> None:

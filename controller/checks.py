@@ -6,9 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.legs import LEGS, Leg
-from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.state import Snapshot
-from motions.postures import SIT_POSE, STAND_HEIGHT, TUCKED_JOINTS
 
 STILL_SPEED = 0.05
 """Speed [m/s] of the base below which it counts as still."""
@@ -23,21 +21,21 @@ ANGLE_TOLERANCE = 0.1
 """Angle [rad] from the asked attitude that still counts as there."""
 LYING_HEIGHT = 0.13
 """Height [m] of the base above the lowest foot below which the robot is down."""
-BELLY_HEIGHT = 0.095
-"""Height [m] of the base above the lowest foot below which the belly is down: 0.085 at rest."""
+SETTLED = 0.01
+"""Height [m] of the base above where it goes limp below which the belly is down."""
 FOLD_TOLERANCE = 0.5
 """Angle [rad] from the tucked legs' joints that still counts as folded."""
 
 
 def unfolded_legs(snapshot: Snapshot) -> list[Leg]:
     """The legs that are not folded below the trunk, so that the robot must not rise on them."""
-    off = np.abs(snapshot.state.joint_positions - TUCKED_JOINTS)
+    off = np.abs(snapshot.state.joint_positions - snapshot.profile.tucked_joints)
     return [leg for leg in LEGS if off[leg.joints].max() > FOLD_TOLERANCE]
 
 
 def ground_height(snapshot: Snapshot) -> float:
     """Height [m] of the ground below the lowest foot."""
-    return float(snapshot.p_world_feet[:, 2].min()) - FOOT_RADIUS
+    return float(snapshot.p_world_feet[:, 2].min() - snapshot.foot_radius)
 
 
 def base_height(snapshot: Snapshot) -> float:
@@ -58,7 +56,7 @@ def _over_feet(snapshot: Snapshot, p_world: Float[np.ndarray, "3"]) -> float:
     feet = snapshot.p_world_feet - p_world
     plane = np.column_stack([np.ones(4), feet[:, :2]])
     below = np.linalg.lstsq(plane, feet[:, 2], rcond=None)[0]
-    return FOOT_RADIUS - float(below[0])
+    return float(snapshot.foot_radius) - float(below[0])
 
 
 def is_still(snapshot: Snapshot) -> bool:
@@ -84,18 +82,19 @@ def _is_on_its_feet(snapshot: Snapshot, height_error: float, pitch: float) -> bo
 
 def is_standing(snapshot: Snapshot) -> bool:
     """Whether the robot stands still on four feet, level, at the standing height."""
-    return _is_on_its_feet(snapshot, com_height(snapshot) - STAND_HEIGHT, 0.0)
+    return _is_on_its_feet(snapshot, com_height(snapshot) - snapshot.profile.stand_height, 0.0)
 
 
 def is_sitting(snapshot: Snapshot) -> bool:
     """Whether the robot sits still: rump down, trunk up, four feet on the ground."""
-    height = _over_feet(snapshot, snapshot.state.p_world_base)
-    return _is_on_its_feet(snapshot, height - SIT_POSE[2], SIT_POSE[4])
+    height, pitch = snapshot.profile.sit
+    over = _over_feet(snapshot, snapshot.state.p_world_base)
+    return _is_on_its_feet(snapshot, over - height, pitch)
 
 
 def is_lying(snapshot: Snapshot) -> bool:
     """Whether the robot lies still on its belly."""
-    is_down = base_height(snapshot) < BELLY_HEIGHT
+    is_down = base_height(snapshot) < snapshot.profile.lie_height + SETTLED
     return bool(is_down and snapshot.state.tilt < 0.5 and is_still(snapshot))
 
 

@@ -63,6 +63,7 @@ class GO2Controller:
         realtime: bool = False,
         viewer: bool = False,
         config: Config | Path | str | None = None,
+        robot: str | None = None,
         urdf: Path | str | None = None,
         after_tick: Callable[[], None] = lambda: None,
         extra_tasks: Sequence[Task] = (),
@@ -75,7 +76,9 @@ class GO2Controller:
             realtime: let the robot live at wall-clock pace in a background thread.
             viewer: open MuJoCo's viewer if there is a display.
             config: numbers of the engine, or a TOML file that overrides some.
-            urdf: another URDF of the Go2 instead of the installed one: what the controller takes
+            robot: name of its profile: "go2", "a1" or "go1"; by default that of the plant or the
+                configuration.
+            urdf: another URDF of the robot instead of the installed one: what the controller takes
                 the robot for. Without ``plant`` the simulated robot is built from it, too.
             after_tick: is called after every control period, in the thread that ticks.
             extra_tasks: tasks of your own in the whole-body QP, beside the built-in ones, whenever
@@ -85,20 +88,26 @@ class GO2Controller:
             ConfigError: for a namespace, configuration or task that is not valid, or without
                 ``realtime`` for a plant that needs it.
             SolverUnavailable: if the configured QP solver is unknown or not installed.
-            DescriptionError: if the robot's files are missing, broken, or not a Go2's.
+            DescriptionError: if the robot's files are missing, broken, or not such a
+                robot's.
             PlantError: if the plant does not answer.
         """
         self._namespace = arguments.namespace(namespace)
         viewer = arguments.checked("viewer", viewer, bool, "True or False")
-        config = arguments.config(config)
         plant = arguments.checked("plant", plant, Plant | None, "a Plant")
+        config = arguments.config(config, robot, plant)
         realtime = arguments.pace(realtime, plant)
         urdf = arguments.checked("urdf", urdf, Path | str | None, "a path")
-        description = find_description(None if urdf is None else Path(urdf))
+        description = find_description(None if urdf is None else Path(urdf), config.robot)
         tasks = arguments.tasks(extra_tasks)
         with ExitStack() as opened:
             if plant is None:
-                plant = MujocoPlant(urdf=description.urdf_path, visuals=viewer, motor=config.motor)
+                plant = MujocoPlant(
+                    urdf=description.urdf_path,
+                    robot=config.robot,
+                    visuals=viewer,
+                    motor=config.motor,
+                )
                 opened.callback(plant.close)
             self._plant = plant
             self._pilot = build_pilot(
@@ -242,8 +251,9 @@ class GO2Controller:
             CommandError: for another side or time.
         """
         if plan is None:
+            own = self._description.profile.motions.get("high_five", {})
             try:
-                timeline = motions.load_motion("high_five", side=side, hold=hold)
+                timeline = motions.load_motion("high_five", side=side, hold=hold, **own)
             except TimelineError as error:
                 raise CommandError(str(error)) from None
             with self._planning:

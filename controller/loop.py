@@ -91,7 +91,7 @@ class ControlLoop:
         self._dynamic_wbc = dynamic_wbc or wbc
         self._is_hardware = plant.is_hardware
         self._safety = safety
-        self._falls = FallDetector(safety)
+        self._falls = FallDetector(safety, model.profile)
         self._sag = self._lean = 0.0
         self.fault: Fault | None = None
         self.warn: Callable[..., None] = _log.warning

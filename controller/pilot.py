@@ -119,7 +119,7 @@ class Pilot:
         """Sit like a dog, from any mode but fallen."""
         if self.mode is not Mode.SITTING:
             self._ensure_standing()
-            self._take_posture(ChangePosture(sit_down))
+            self._take_posture(ChangePosture(partial(sit_down, profile=self._loop.model.profile)))
         return self._settle(Posture.SIT, "sit")
 
     def lie_down(self) -> Measurements:
@@ -128,7 +128,7 @@ class Pilot:
         if self.mode not in (Mode.LYING, Mode.DAMPED) and not self._is_on_the_ground:
             if self.mode is not Mode.MOVING:  # a stand that failed need not succeed to lie down
                 self._ensure_standing()
-            self._take_posture(ChangePosture(lie_down))
+            self._take_posture(ChangePosture(partial(lie_down, profile=self._loop.model.profile)))
         lie_limp(self._runner)
         return self._settle(Posture.LIE, "lie down")
 
@@ -146,7 +146,8 @@ class Pilot:
         self._runner.run(change, 5.0)
 
     def _make_standing(self, entry: Posture, duration: float) -> Standing:
-        make_plan = partial(rise, entry=entry, duration=duration)
+        own = self._loop.model.profile
+        make_plan = partial(rise, entry=entry, duration=duration, profile=own)
         friction = self._walker.walking.friction
         return Standing(make_plan, self._loop.model, self._config.locomotion, friction)
 

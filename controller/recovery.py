@@ -19,7 +19,6 @@ from controller.checks import unfolded_legs
 from controller.loop import ControlLoop
 from controller.runner import Runner
 from go2_wbc.legs import LEGS, Leg
-from motions.postures import SPLAYED_JOINTS, TUCKED_JOINTS
 
 ON_BELLY = 0.6
 """Tilt [rad] below which the robot lies on its belly."""
@@ -53,7 +52,7 @@ def tuck(runner: Runner) -> None:
     loop = runner.loop
     if loop.state.tilt > ON_BELLY:
         runner.give_up(f"cannot stand up from {_attitude(loop)}; call recover()")
-    way = ((TUCK_TIME, TUCKED_JOINTS),)
+    way = ((TUCK_TIME, loop.model.profile.tucked_joints),)
     runner.run(ServoJoints("tuck", way, stays_on_belly=True), TUCK_TIME + GRACE)
     jammed = unfolded_legs(loop.snapshot)
     if jammed:
@@ -63,7 +62,8 @@ def tuck(runner: Runner) -> None:
 def lie_limp(runner: Runner) -> None:
     """Spread the folded legs and go limp."""
     if runner.loop.state.tilt < ON_BELLY:  # or it would rest on folded legs, belly in the air
-        splay = ServoJoints("splay", ((SPLAY_TIME, SPLAYED_JOINTS),), stays_on_belly=True)
+        way = ((SPLAY_TIME, runner.loop.model.profile.splayed_joints),)
+        splay = ServoJoints("splay", way, stays_on_belly=True)
         runner.run(splay, SPLAY_TIME + GRACE)
     runner.run(Damped("lie", LIMP_TIME, stays_on_belly=True), LIMP_TIME + GRACE)
 
@@ -99,42 +99,47 @@ def roll_over(loop: ControlLoop) -> Iterator[Behaviour]:
 
     At the end it lies on its belly with folded legs, or it has not succeeded.
     """
-    yield _fold()
+    tucked = loop.model.profile.tucked_joints
+    yield _fold(tucked)
     has_freed, rolls = False, 0
     for _ in range(TRIES):
         jammed, lies_on_belly = unfolded_legs(loop.snapshot), loop.state.tilt < ON_BELLY
         if lies_on_belly and not jammed:
             return
         if jammed and (lies_on_belly or not has_freed):
-            yield _freed(loop.state.joint_positions, jammed)
+            yield _freed(loop.state.joint_positions, jammed, tucked)
             has_freed = True
         else:  # on its back, legs that lie under the trunk come free only by rolling
             has_freed = False
             nearer = 1 if loop.state.rpy[0] >= 0 else -1
             side = -nearer if rolls % 2 else nearer  # the legs of one side may be stuck
             rolls += 1
-            reach, push = _one_side(side, REACHED_BACK), _one_side(side, PUSHING)
+            reach, push = _one_side(side, REACHED_BACK, tucked), _one_side(side, PUSHING, tucked)
             yield ServoJoints("reach back", ((0.5, reach), (0.1, reach)), kp=80.0)
             yield ServoJoints("push over", ((0.24, push), (0.4, push)), kp=80.0)
-            yield _fold()
+            yield _fold(tucked)
 
 
-def _fold() -> ServoJoints:
-    return ServoJoints("fold legs", ((0.6, TUCKED_JOINTS), (0.3, TUCKED_JOINTS)), kp=60.0)
+def _fold(tucked: Float[np.ndarray, "12"]) -> ServoJoints:
+    return ServoJoints("fold legs", ((0.6, tucked), (0.3, tucked)), kp=60.0)
 
 
-def _freed(measured: Float[np.ndarray, "12"], jammed: list[Leg]) -> ServoJoints:
+def _freed(
+    measured: Float[np.ndarray, "12"], jammed: list[Leg], tucked: Float[np.ndarray, "12"]
+) -> ServoJoints:
     """Turn the hips of ``jammed`` legs outwards, fold them out there, and draw them in."""
-    out, folded = measured.copy(), TUCKED_JOINTS.copy()
+    out, folded = measured.copy(), tucked.copy()
     for leg in jammed:
         hip = leg.joints.start
         out[hip] = folded[hip] = leg.side * OUTWARDS
-    targets = ((0.3, out), (0.1, out), (0.8, folded), (0.4, TUCKED_JOINTS), (0.2, TUCKED_JOINTS))
+    targets = ((0.3, out), (0.1, out), (0.8, folded), (0.4, tucked), (0.2, tucked))
     return ServoJoints("free legs", targets, kp=60.0)
 
 
-def _one_side(side: int, joints: tuple[float, float, float]) -> Float[np.ndarray, "12"]:
-    target = TUCKED_JOINTS.copy()
+def _one_side(
+    side: int, joints: tuple[float, float, float], tucked: Float[np.ndarray, "12"]
+) -> Float[np.ndarray, "12"]:
+    target = tucked.copy()
     for leg in LEGS:
         if leg.side == side:
             target[leg.joints] = np.array(joints) * (side, 1.0, 1.0)

@@ -80,7 +80,7 @@ class Walker:
             envelope_of(g, self._config.cautious_envelope) for g in (walking.gait, gait)
         )
         middle = before.within(after).scaled(CHANGE_SHARE)
-        self._envelope = envelope_of(gait, self._config.envelope)
+        self._envelope = self._widest(gait)
         asked = self._envelope.clip(walking.command)
         walking.command = slowed = middle.clip(asked)
         self._runner.until(lambda: walking.follows_command, STOP_LIMIT, "slow down")
@@ -100,7 +100,10 @@ class Walker:
         choice = walking.choice
         if choice is not None:
             return choice.envelope
-        return envelope_of(walking.gait, self._config.envelope)
+        return self._widest(walking.gait)
+
+    def _widest(self, gait: Gait) -> VelocityEnvelope:
+        return envelope_of(gait, self._config.envelope, self._runner.loop.model.profile)
 
     def follow(self, command: VelocityCommand, pose: BodyPose | None = None) -> VelocityCommand:
         """Follow ``command``, clipped to the envelope of the gait; returns what is followed.

@@ -29,6 +29,7 @@ from go2_wbc.planning.trunk import PoseEnvelope
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.motor import TORQUE_SPEED, require_motor
 from go2_wbc.robot.payload_estimation import PayloadConfig
+from go2_wbc.robot.profile import GO2, find_profile
 from go2_wbc.robot.safety import SafetyConfig
 from go2_wbc.validation import is_finite_number
 from go2_wbc.wbc.config import WbcConfig
@@ -44,7 +45,7 @@ class Config:
         wbc: whole-body controller.
         locomotion: locomotion planner.
         envelope: velocity commands that are followed. None, and so not configured: in simulation
-            ``planning.envelopes.TROT``, which was measured; where a real robot may be moved
+            that of the robot's profile, which was measured; where a real robot may be moved
             (``beside_hardware``) the default of ``VelocityEnvelope``.
         pose: poses of the trunk that are taken while walking.
         safety: when to give up.
@@ -54,6 +55,7 @@ class Config:
         backend: whole-body back end: condensed, full or placo.
         motor: what the motors are taken for: "torque-speed", or "ideal" for the peak torque at
             every speed.
+        robot: name of the profile of the robot that they are for; ``of_robot`` has all of them.
     """
 
     wbc: WbcConfig = field(default_factory=WbcConfig)
@@ -66,12 +68,23 @@ class Config:
     feasibility: FeasibilityLimits = field(default_factory=FeasibilityLimits)
     backend: str = "condensed"
     motor: str = TORQUE_SPEED
+    robot: str = GO2
 
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for an unknown motor."""
+        """Raise ConfigError for an unknown motor or robot."""
         require_motor(self.motor)
+        find_profile(self.robot)
+
+    @staticmethod
+    def of_robot(name: str) -> Config:
+        """The numbers of a robot that ships.
+
+        Raises:
+            ConfigError: for an unknown one; lists the valid ones.
+        """
+        return override(Config(robot=name), find_profile(name).config, where=f"robot {name!r}")
 
     @property
     def cautious_envelope(self) -> VelocityEnvelope:
@@ -85,7 +98,7 @@ class Config:
 
 
 def load_config(path: Path | str) -> Config:
-    """The default configuration with the overrides of a TOML file.
+    """The default configuration, or that of its ``robot``, with the overrides of a TOML file.
 
     Raises:
         ConfigError: if the file cannot be read, names an unknown key, or has a wrong value.
@@ -96,7 +109,9 @@ def load_config(path: Path | str) -> Config:
         raise ConfigError(f"cannot read the configuration {path}: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path} is not valid TOML: {error}") from error
-    return override(Config(), overrides, where=str(path))
+    robot = overrides.get("robot", GO2)
+    own = Config.of_robot(robot) if isinstance(robot, str) else Config()
+    return override(own, overrides, where=str(path))
 
 
 def override(part: _Part, values: Mapping[str, Any], where: str) -> _Part:

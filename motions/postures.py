@@ -13,6 +13,7 @@ from go2_wbc.curves import Curve
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.reference import Reference, Target, TrackedPoint
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import RobotProfile, find_profile
 from go2_wbc.tracking.plan_curves import stand
 from motions.batch_kinematics import Wanted, attitudes, place
 
@@ -20,24 +21,15 @@ NORMAL_FORCE_MIN = 0.0
 """Least normal force [N] asked of a foot: none, so that a pushed robot may tip and come back."""
 NORMAL_FORCE_MAX = 400.0
 """Greatest normal force [N]: 2.5 times the robot's weight, never active in slow motions."""
-STAND_HEIGHT = 0.29
-"""Height [m] of the CoM above the ground when standing."""
-STAND_POSE = np.array([0.0, 0.0, STAND_HEIGHT, 0.0, 0.0, 0.0])
-"""CoM position [m] in the motion's frame, then roll, pitch, yaw [rad]."""
-SIT_POSE = np.array([0.0, 0.0, 0.235, 0.0, np.radians(-38.0), 0.0])
-"""Base position [m] and roll, pitch, yaw [rad] of the dog-like sit: rump down, front legs up.
-
-The rear feet stay 9 cm below their hips' axes: much further down the rear legs cross a singularity
-and rattle, unless the feet happen to be splayed (own simulation).
-"""
-LIE_POSE = np.array([0.0, 0.0, 0.085, 0.0, 0.0, 0.0])
-"""Base position [m] and angles [rad] just above the ground, from which the robot goes limp."""
-TUCKED_JOINTS = np.tile([0.0, 1.30, -2.66], 4)
-"""Joint angles [rad] with the feet under the hips and the belly on the ground."""
-SPLAYED_JOINTS = TUCKED_JOINTS + np.tile([0.3, 0.0, 0.0, -0.3, 0.0, 0.0], 2)
-"""Joint angles [rad] with the feet beside the hips, so that the folded legs carry nothing."""
 SETTLING_STEPS = 10
 """Steps that put the CoM of a standing robot in its place; see ``place``."""
+
+
+def __getattr__(name: str) -> Float[np.ndarray, "6"]:
+    """``STAND_POSE``: that of a Go2, as it could be imported before there were other robots."""
+    if name == "STAND_POSE":
+        return find_profile().stand_pose
+    raise AttributeError(name)
 
 
 def standing_feet(model: RobotModel) -> Float[np.ndarray, "4 3"]:
@@ -76,10 +68,11 @@ def home_poses(model: RobotModel) -> Mapping[Posture, Float[np.ndarray, "6"]]:
     """
     home = _HOMES.get(model)
     if home is None:
-        R = attitudes(STAND_POSE[None, 3:])[0]
-        p_base, _ = standing_on(standing_feet(model), STAND_POSE[:3], R, model)
-        stand = np.concatenate([p_base, STAND_POSE[3:]])
-        home = {Posture.STAND: stand, Posture.SIT: SIT_POSE, Posture.LIE: LIE_POSE}
+        own = model.profile
+        pose, R = own.stand_pose, attitudes(own.stand_pose[None, 3:])[0]
+        p_base, _ = standing_on(standing_feet(model), pose[:3], R, model)
+        stand = np.concatenate([p_base, pose[3:]])
+        home = {Posture.STAND: stand, Posture.SIT: own.sit_pose, Posture.LIE: own.lie_pose}
         _HOMES[model] = home
     return home
 
@@ -120,27 +113,40 @@ class PosturePlan(MotionPlan):
         return target.row
 
 
-def rise(start: Float[np.ndarray, "6"], entry: Posture, duration: float = 1.2) -> PosturePlan:
-    """From a CoM pose (6,) to standing."""
-    way = Curve((0.0, duration), (start, STAND_POSE))
+def rise(
+    start: Float[np.ndarray, "6"],
+    entry: Posture,
+    duration: float = 1.2,
+    profile: RobotProfile | None = None,
+) -> PosturePlan:
+    """From a CoM pose (6,) to standing; a Go2 without a ``profile``, as all of these."""
+    way = Curve((0.0, duration), (start, (profile or find_profile()).stand_pose))
     return PosturePlan("stand", entry, Posture.STAND, TrackedPoint.COM, way)
 
 
 def lean(
-    start: Float[np.ndarray, "6"], rpy: Float[np.ndarray, "3"], duration: float = 1.0
+    start: Float[np.ndarray, "6"],
+    rpy: Float[np.ndarray, "3"],
+    duration: float = 1.0,
+    profile: RobotProfile | None = None,
 ) -> PosturePlan:
     """From a standing CoM pose (6,) to standing with the trunk at roll, pitch, yaw [rad]."""
-    way = Curve((0.0, duration), (start, np.concatenate([STAND_POSE[:3], rpy])))
+    stand = (profile or find_profile()).stand_pose
+    way = Curve((0.0, duration), (start, np.concatenate([stand[:3], rpy])))
     return PosturePlan("lean", Posture.STAND, Posture.STAND, TrackedPoint.COM, way)
 
 
-def sit_down(start: Float[np.ndarray, "6"], duration: float = 1.5) -> PosturePlan:
+def sit_down(
+    start: Float[np.ndarray, "6"], duration: float = 1.5, profile: RobotProfile | None = None
+) -> PosturePlan:
     """From a standing base pose (6,) to the dog-like sit."""
-    way = Curve((0.0, duration), (start, SIT_POSE))
+    way = Curve((0.0, duration), (start, (profile or find_profile()).sit_pose))
     return PosturePlan("sit", Posture.STAND, Posture.SIT, TrackedPoint.BASE, way)
 
 
-def lie_down(start: Float[np.ndarray, "6"], duration: float = 1.5) -> PosturePlan:
+def lie_down(
+    start: Float[np.ndarray, "6"], duration: float = 1.5, profile: RobotProfile | None = None
+) -> PosturePlan:
     """From a standing base pose (6,) down to the ground."""
-    way = Curve((0.0, duration), (start, LIE_POSE))
+    way = Curve((0.0, duration), (start, (profile or find_profile()).lie_pose))
     return PosturePlan("lie down", Posture.STAND, Posture.LIE, TrackedPoint.BASE, way)

@@ -49,6 +49,10 @@ test -s out/demo/demo.html
 "$bin/high_five_demo" --no-media >/dev/null
 "$bin/go2-wbc" check wave >/dev/null
 
+echo "== tutorial, README and guides, as written"
+(cd "$here" && GO2_WBC_USERS_BIN="$bin" "$python" -m pytest -n 2 -q tests/test_docs.py \
+    -k "tutorial or runs_alone")
+
 echo "== a user's script under strict type checkers: of the wheel, and of the checkout"
 cp "$here/tests/user_script.py" .
 echo '{"typeCheckingMode": "strict"}' >pyrightconfig.json

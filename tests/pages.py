@@ -39,6 +39,8 @@ NOT_RUN = "# not run by the tests"
 # splines round differently.
 NEAR, NEAR_ZERO = 0.03, 1e-3
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+USERS_BIN = os.environ.get("GO2_WBC_USERS_BIN")
+"""``bin`` of another environment, in which a user would do what the pages say."""
 
 
 @dataclass(frozen=True)
@@ -109,11 +111,15 @@ def command_lines(name: str) -> list[list[str]]:
 
 def run_python(text: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """Run a Python block alone, in ``folder``."""
+    if USERS_BIN:
+        return _of_user([f"{USERS_BIN}/python", "-c", text], folder)
     return run_script(["-c", text], folder, _environment())
 
 
 def run_command(words: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
     """Run ``go2-wbc``, ``pytest`` or ``python`` of this checkout, installed or not."""
+    if USERS_BIN:
+        return _of_user([f"{USERS_BIN}/{words[0]}", *words[1:]], folder)
     program = {
         "go2-wbc": ["-m", "controller.cli.main"],
         "pytest": ["-m", "pytest", "-p", "motions.pytest_plugin"],
@@ -126,6 +132,20 @@ def run_command(words: Sequence[str], folder: Path) -> subprocess.CompletedProce
         [sys.executable, *arguments],
         cwd=folder,
         env=_environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def _of_user(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """As typed by somebody whose environment is on the path."""
+    path = f"{USERS_BIN}:{os.environ['PATH']}"
+    environment = {name: os.environ[name] for name in ("HOME",) if name in os.environ}
+    return subprocess.run(
+        command,
+        cwd=folder,
+        env={**environment, "PATH": path, "COLUMNS": "80"},
         capture_output=True,
         text=True,
         check=False,

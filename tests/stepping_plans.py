@@ -11,9 +11,12 @@ from go2_wbc.contacts import ContactSchedule
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from motions.plan.compiled_plan import CompiledPlan
-from motions.postures import STAND_HEIGHT, standing_feet
+from motions.postures import standing_feet
 from tests.engine_helpers import STAND_JOINTS
+
+STAND_HEIGHT = find_profile().stand_height
 
 LIFT_OFF, TOUCHDOWN = 0.8, 1.2
 """Of the step [s]."""

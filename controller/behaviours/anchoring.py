@@ -11,7 +11,6 @@ from go2_wbc.curves import Ease
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.reference import Anchor, Target
-from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.tracking.plan_tracking import tracked_position
@@ -27,7 +26,9 @@ SAME_PLACE = 0.01
 _PAIR = 2
 
 
-def anchor_of(plan: MotionPlan, p_world_feet: Float[np.ndarray, "4 3"]) -> Anchor:
+def anchor_of(
+    plan: MotionPlan, p_world_feet: Float[np.ndarray, "4 3"], foot_radius: float
+) -> Anchor:
     """Where ``plan`` is played by a robot whose feet stand there.
 
     That is the frame of the feet (``Anchor.of_feet``). On two feet, though, the CoM balances over
@@ -35,7 +36,7 @@ def anchor_of(plan: MotionPlan, p_world_feet: Float[np.ndarray, "4 3"]) -> Ancho
     planned places, so is that line: 5 mm become 30 mm in half a second. So a dynamic plan is moved
     by as much as the lines between such feet are beside their planned places.
     """
-    anchor = Anchor.of_feet(p_world_feet, FOOT_RADIUS)
+    anchor = Anchor.of_feet(p_world_feet, foot_radius)
     pairs = _pairs(plan) if plan.has_dynamic_spans else []
     if not pairs:
         return anchor

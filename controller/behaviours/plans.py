@@ -13,7 +13,6 @@ from controller.behaviours.safe_return import SafeReturn
 from controller.behaviours.weight import FeltWeight
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.reference import Anchor, Reference, Target
-from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.motor import JointFriction
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from go2_wbc.robot.state import Snapshot
@@ -51,7 +50,7 @@ class PlayPlan(Behaviour):
         """Anchor the plan at the feet."""
         super().start(snapshot)
         self._last = self._start
-        self._anchor = anchor_of(self.plan, snapshot.p_world_feet)
+        self._anchor = anchor_of(self.plan, snapshot.p_world_feet, snapshot.foot_radius)
         self._tracker = PlanTracker(self._anchor, self.plan.footsteps)
         self._approach = Approach.of(self.plan, self._anchor, snapshot)
         self._weight = FeltWeight(self._friction)
@@ -81,8 +80,8 @@ class PlayPlan(Behaviour):
         That is where the plan ends, placed where the robot stood when it began.
         """
         planned = self.plan.at(self.plan.duration).placed(self._anchor).p_world_feet
-        wanted = Anchor.of_feet(planned, FOOT_RADIUS)
-        stands = Anchor.of_feet(snapshot.p_world_feet, FOOT_RADIUS)
+        wanted = Anchor.of_feet(planned, snapshot.foot_radius)
+        stands = Anchor.of_feet(snapshot.p_world_feet, snapshot.foot_radius)
         off = (stands.p_world - wanted.p_world)[:2]
         return float(np.linalg.norm(off)), abs(wrap_angle(stands.yaw - wanted.yaw))
 

@@ -194,6 +194,7 @@ def _controller(output: Output, robot: Robot, control: Control) -> GO2Controller
     viewer = output.viewer and _has_display()
     plant = MujocoPlant(
         robot.mjcf,
+        robot=config.robot,
         friction=robot.friction,
         mass_scale=robot.mass_scale,
         seed=robot.seed or 0,

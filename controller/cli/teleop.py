@@ -52,7 +52,13 @@ def run(
     pad, said = (None, "keys only") if keyboard else find_gamepad()
     print(keys_help(), said, *([] if pad is None else [LEGEND]), sep="\n")
     numbers = read_config(config).beside_hardware
-    simulator = MujocoPlant(mjcf, motor=numbers.motor, sensors=sensors, estimator=numbers.estimator)
+    simulator = MujocoPlant(
+        mjcf,
+        robot=numbers.robot,
+        motor=numbers.motor,
+        sensors=sensors,
+        estimator=numbers.estimator,
+    )
     with (
         closing(simulator) as plant,
         GO2Controller(plant=plant, realtime=True, viewer=viewer, config=numbers) as go2,

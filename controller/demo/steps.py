@@ -15,7 +15,7 @@ from controller.go2_controller import GO2Controller
 from controller.modes import Outcome
 from controller.navigation import HEADING_TOLERANCE
 from go2_wbc.recording import Recording
-from motions.postures import SIT_POSE, STAND_HEIGHT
+from go2_wbc.robot.profile import find_profile
 
 FORWARD_SPEED = 0.2
 """Speed [m/s] of the walk."""
@@ -80,11 +80,12 @@ def displacement(recording: Recording, start: int = 0) -> Float[np.ndarray, "2"]
 
 def _standing(run: StepRun) -> tuple[Measurement, ...]:
     height = _of(run, "CoM height [m]")
-    return (Measurement("CoM height", height, "m", STAND_HEIGHT, HEIGHT_TOLERANCE),)
+    return (Measurement("CoM height", height, "m", find_profile().stand_height, HEIGHT_TOLERANCE),)
 
 
 def _sitting(run: StepRun) -> tuple[Measurement, ...]:
-    height, pitch = float(SIT_POSE[2]), math.degrees(SIT_POSE[4])
+    height, angle = find_profile().sit
+    pitch = math.degrees(angle)
     tolerance = math.degrees(ANGLE_TOLERANCE)
     return (
         Measurement("base height", _of(run, "base height [m]"), "m", height, HEIGHT_TOLERANCE),

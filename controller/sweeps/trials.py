@@ -14,6 +14,7 @@ from controller.modes import Mode
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
+from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 
@@ -78,8 +79,8 @@ class Trial:
 
 
 @cache
-def _model(motor: str) -> RobotModel:
-    return RobotModel(motor=motor)
+def _model(motor: str, robot: str) -> RobotModel:
+    return RobotModel(find_description(robot=robot), motor=motor)
 
 
 class TrialRobot:
@@ -101,7 +102,7 @@ class TrialRobot:
     @property
     def model(self) -> RobotModel:
         """What the controller takes the robot for, for those who plan and judge."""
-        return _model(self._motor)
+        return _model(self._motor, self.plant.robot)
 
     def close(self) -> None:
         """End the robot; idempotent."""

@@ -54,7 +54,7 @@ class VelocityEnvelope:
     """Commands that are followed.
 
     The speeds are combined as an ellipsoid: a command on its surface uses the whole envelope. Those
-    by default are half of what the trot holds in simulation or less (``planning.envelopes.TROT``).
+    by default are half of what the trot holds in simulation or less (``envelopes.trot_of``).
 
     Attributes:
         forward, backward, lateral: speeds [m/s].

@@ -21,6 +21,7 @@ from jaxtyping import Float
 
 from go2_wbc.contacts import GAITS, Gait
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
+from go2_wbc.robot.profile import RobotProfile, find_profile
 
 FILE = Path(__file__).with_name("envelopes.json")
 """Written by ``python -m benchmarks envelopes --store``."""
@@ -41,15 +42,19 @@ def measured_envelopes() -> Mapping[str, VelocityEnvelope]:
     return {name: VelocityEnvelope(**bounds) for name, bounds in gaits.items()}
 
 
-TROT = VelocityEnvelope(forward=3.0, backward=2.0, lateral=1.0, turning=6.0)
-"""In which the trot is walked in simulation where nothing is configured: inside what was measured,
-and held on the robot's own sensors."""
 FULL = VelocityEnvelope(forward=1.6875, backward=1.5469, lateral=1.3438, turning=5.9062)
 """Trot's envelope that gives the other gaits all that was measured of theirs: what a trot held
 whose forces were not planned ahead."""
 
 
-def envelope_of(gait: Gait, trot: VelocityEnvelope | None) -> VelocityEnvelope:
+def trot_of(profile: RobotProfile | None = None) -> VelocityEnvelope:
+    """In which a robot, by default a Go2, trots in simulation where nothing is configured."""
+    return VelocityEnvelope(*(profile or find_profile()).envelope)
+
+
+def envelope_of(
+    gait: Gait, trot: VelocityEnvelope | None, profile: RobotProfile | None = None
+) -> VelocityEnvelope:
     """The envelope in which ``gait`` is walked.
 
     Args:
@@ -57,10 +62,11 @@ def envelope_of(gait: Gait, trot: VelocityEnvelope | None) -> VelocityEnvelope:
             does one that has not been measured yet.
         trot: the envelope that is configured, which the trot has itself. Those of the others are
             in proportion to it, and never beyond what was measured. None, if none is configured:
-            ``TROT`` for the trot, for the others what goes with ``VelocityEnvelope()``.
+            ``trot_of`` for the trot, for the others what goes with ``VelocityEnvelope()``.
+        profile: of the robot, by default a Go2.
     """
     if gait == GAITS["trot"]:
-        return trot or TROT
+        return trot or trot_of(profile)
     trot, measured = trot or VelocityEnvelope(), measured_envelopes()
     if GAITS.get(gait.name) != gait or gait.name not in measured:
         return trot.scaled(gait.envelope_share)

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
+from go2_wbc.robot.profile import GO2
 from go2_wbc.robot.state import JointCommand, PartFault, RobotState
 
 
 class Plant(ABC):
-    """A Go2 that can be read and commanded; its clock is the only clock of the controller.
+    """A robot that can be read and commanded; its clock is the only clock of the controller.
 
     One control tick is ``read()``, then ``write(command)``, which lets one control period pass.
+
+    Attributes:
+        robot: name of the profile of the robot that it is.
+        joint_damping: viscous friction of the joints [N m s/rad], if it is written down, else 0.
     """
+
+    robot: str = GO2
+    joint_damping: tuple[float, ...] = (0.0,) * 12
 
     @property
     @abstractmethod

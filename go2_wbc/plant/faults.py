@@ -20,6 +20,7 @@ from jaxtyping import Float
 from go2_wbc.errors import CommandError, unknown_name
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant.sensors import ImuSample
+from go2_wbc.robot.description import RobotDescription
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.sensor_watch import SensorWatch
 from go2_wbc.robot.state import RobotState, SensorReading
@@ -124,8 +125,9 @@ class Faults:
         watch: of sensors that no estimator reads.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, description: RobotDescription) -> None:
         """A sound robot."""
+        self._description = description
         self.watch: SensorWatch | None = None
         self.known: tuple[InjectedFault, ...] = ()
         self._last: SensorReading | None = None
@@ -194,7 +196,7 @@ class Faults:
         For a robot that is told its state: a foot touches where it feels more than ``threshold``.
         """
         if self.watch is None:
-            self.watch = SensorWatch(RobotModel())
+            self.watch = SensorWatch(RobotModel(self._description))
         read = state.v[3:6], imu.accelerometer, state.joint_positions, state.joint_velocities
         reading = self.broken(SensorReading(state.time, *read, state.tau, state.foot_forces))
         reading = self.watch.checked(reading, state.q[3:7])

@@ -26,6 +26,7 @@ from go2_wbc.curves import Curve
 from go2_wbc.errors import PlantError, PlantTimeout
 from go2_wbc.legs import JOINT_NAMES, LEGS
 from go2_wbc.plant.base import Plant
+from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import JointFriction
 from go2_wbc.robot.state import JointCommand, RobotState
@@ -171,7 +172,7 @@ class _Sweep:
 
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
-        self._model = RobotModel()
+        self._model = RobotModel(find_description(robot=plant.robot))
         self._state: RobotState = plant.read()
         self._target = self._state.joint_positions.copy()
 

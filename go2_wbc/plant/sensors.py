@@ -152,14 +152,18 @@ class Proprioception:
     def __init__(
         self,
         errors: SensorErrors,
+        model: RobotModel,
         period: float,
         rng: np.random.Generator,
         estimator: EstimatorConfig | None = None,
     ) -> None:
-        """Draw the biases from ``rng``, of which every later error is drawn, too."""
+        """Draw the biases from ``rng``, of which every later error is drawn, too.
+
+        ``model``: what the robot knows of itself.
+        """
         self._errors, self._rng, self._config = errors, rng, estimator
         self._late = round(errors.latency / period)
-        self._model = RobotModel()
+        self._model = model
         self._gyro_bias = errors.gyro_bias * rng.standard_normal(3)
         self._force_bias = errors.accelerometer_bias * rng.standard_normal(3)
         self.restart()

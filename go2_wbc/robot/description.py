@@ -1,4 +1,4 @@
-"""Finds the Go2's real URDF, SRDF and meshes, and checks that they describe a Go2.
+"""Finds a robot's real URDF, SRDF and meshes, and checks that they describe such a robot.
 
 Every model of the project (Pinocchio, MuJoCo, PlaCo, meshcat) is built from the files named here,
 so that any two of them can be compared number by number.
@@ -19,11 +19,12 @@ from jaxtyping import Int
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.records import ArrayNx3
+from go2_wbc.robot.profile import GO2, RobotProfile, find_profile
 
 BASE_LINK = "base"
 INSTALL_LINE = "pip install example-robot-data"
 _SHARE = Path("cmeel.prefix") / "share"
-_ROBOT = Path("example-robot-data") / "robots" / "go2_description"
+_ROBOTS = Path("example-robot-data") / "robots"
 _PACKAGE_PREFIX = "package://"
 _UNPAINTED = (171, 177, 197, 255)  # a part without a material gets the trunk's grey
 
@@ -33,6 +34,7 @@ class RobotDescription:
     """Where the robot's files are, and the few facts that every model of it needs.
 
     Attributes:
+        profile: what the URDF does not say of the robot.
         urdf_path: the URDF.
         srdf_path: the SRDF, or ``None`` if there is none.
         package_dirs: folders against which ``package://`` mesh names resolve, first match wins.
@@ -44,6 +46,7 @@ class RobotDescription:
             ``JOINT_NAMES``; those of hips in the frame of the base.
     """
 
+    profile: RobotProfile
     urdf_path: Path
     srdf_path: Path | None
     package_dirs: tuple[Path, ...]
@@ -80,31 +83,37 @@ class RobotDescription:
         raise DescriptionError(f"{self.urdf_path}: mesh {filename!r} not found; tried {tried}")
 
 
-def find_description(urdf: Path | str | None = None) -> RobotDescription:
-    """The description of the Go2: the installed one, or a user's own URDF.
+def find_description(urdf: Path | str | None = None, robot: str = GO2) -> RobotDescription:
+    """The description of a robot: the installed one, or a user's own URDF of it.
 
     A user's URDF uses the SRDF beside it (``<name>.srdf`` or ``../srdf/<name>.srdf``), else the
     installed SRDF, if any.
 
     Args:
         urdf: a user's URDF; ``None`` takes the one of the ``example-robot-data`` wheel.
+        robot: name of its profile.
 
     Raises:
-        DescriptionError: if files are missing, unreadable, or lack a joint or foot of the Go2.
+        ConfigError: for an unknown robot.
+        DescriptionError: if files are missing, unreadable, or lack a joint or foot of the robot.
     """
-    share = _find_share()
+    profile = find_profile(robot)
+    share, installed = _find_share(profile), _ROBOTS / profile.description
     if urdf is None:
         if share is None:
-            raise DescriptionError(f"no Go2 description in this environment; {INSTALL_LINE}")
-        urdf = share / _ROBOT / "urdf" / "go2.urdf"
+            raise DescriptionError(
+                f"no {profile.title} description in this environment; {INSTALL_LINE}"
+            )
+        urdf = share / installed / "urdf" / f"{robot}.urdf"
     urdf = Path(urdf).resolve()
     own = () if share is not None and urdf.is_relative_to(share) else tuple(urdf.parents)
     root = _parse(urdf, "URDF")
-    _check_names(urdf, root)
+    _check_names(urdf, root, profile)
     _check_masses(urdf, root)
     efforts, speeds = _joint_limits(urdf, root)
-    srdf = _find_srdf(urdf, share)
+    srdf = _find_srdf(urdf, None if share is None else share / installed / "srdf" / f"{robot}.srdf")
     return RobotDescription(
+        profile=profile,
         urdf_path=urdf,
         srdf_path=srdf,
         package_dirs=own if share is None else (share, *own),
@@ -126,19 +135,19 @@ def parse_disabled_pairs(srdf: Path) -> tuple[tuple[str, str], ...]:
     return tuple((row.get("link1", ""), row.get("link2", "")) for row in rows)
 
 
-def _find_share() -> Path | None:
+def _find_share(profile: RobotProfile) -> Path | None:
     for entry in sys.path:
         share = Path(entry) / _SHARE
-        if (share / _ROBOT / "urdf" / "go2.urdf").is_file():
+        if (share / _ROBOTS / profile.description / "urdf" / f"{profile.name}.urdf").is_file():
             return share.resolve()
     return None
 
 
-def _find_srdf(urdf: Path, share: Path | None) -> Path | None:
+def _find_srdf(urdf: Path, installed: Path | None) -> Path | None:
     name = f"{urdf.stem}.srdf"
     candidates = [urdf.parent / name, urdf.parent.parent / "srdf" / name]
-    if share is not None:
-        candidates.append(share / _ROBOT / "srdf" / "go2.srdf")
+    if installed is not None:
+        candidates.append(installed)
     return next((path for path in candidates if path.is_file()), None)
 
 
@@ -155,13 +164,14 @@ def _parse(path: Path, kind: str) -> ET.Element:
     return root
 
 
-def _check_names(urdf: Path, root: ET.Element) -> None:
+def _check_names(urdf: Path, root: ET.Element, profile: RobotProfile) -> None:
     joints = {joint.get("name") for joint in root.findall("joint")}
     links = {link.get("name") for link in root.findall("link")}
     lacking = [f"joint {name}" for name in JOINT_NAMES if name not in joints]
     lacking += [f"link {name}" for name in (BASE_LINK, *FOOT_NAMES) if name not in links]
     if lacking:
-        raise DescriptionError(f"{urdf} does not describe a Go2; it lacks: {', '.join(lacking)}")
+        listing = ", ".join(lacking)
+        raise DescriptionError(f"{urdf} does not describe a {profile.title}; it lacks: {listing}")
 
 
 def _joint_limits(urdf: Path, root: ET.Element) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -62,7 +62,6 @@ from go2_wbc.records import (
     Record,
     packed,
 )
-from go2_wbc.robot.description import BASE_LINK
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.foot_odometry import Foot, Level, follow_foot, see_foot, see_ground, take_in_leg
 from go2_wbc.robot.leg_kinematics import LegGeometry, Legs, foot_places, leg_table
@@ -263,9 +262,10 @@ class StateEstimator:
         """Estimate the state of ``model``'s robot, and watch its sensors unless told not to."""
         self._config = config or EstimatorConfig()
         pin_model = model.pin_model
-        imu = IMU_FRAME if pin_model.existFrame(IMU_FRAME) else BASE_LINK
-        placement = pin_model.frames[pin_model.getFrameId(imu)].placement
-        self._p_base_imu = np.array(placement.translation)
+        self._p_base_imu = np.array(model.profile.imu_place)
+        if pin_model.existFrame(IMU_FRAME):
+            imu = pin_model.frames[pin_model.getFrameId(IMU_FRAME)]
+            self._p_base_imu = np.array(imu.placement.translation)
         self._geometry = [LegGeometry.of(model, leg) for leg in LEGS]
         sizes = self._p_base_imu, model.foot_radius, model.gravity
         self._numbers = packed(EstimatorNumbers(self._config, leg_table(model), *sizes))

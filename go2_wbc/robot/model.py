@@ -1,4 +1,4 @@
-"""The Go2 as Pinocchio sees it: limits, geometry, and the per-tick snapshot.
+"""The robot as Pinocchio sees it: limits, geometry, and the per-tick snapshot.
 
 One ``RobotModel`` owns one Pinocchio model and data. ``snapshot(state)`` computes every dynamic
 quantity of the tick, by ``robot.rigid_body`` if the robot's legs turn about the axes of a Go2's.
@@ -24,10 +24,6 @@ from go2_wbc.robot.rigid_body import RigidBodies, fill_snapshot
 from go2_wbc.robot.state import RobotState, Snapshot
 from go2_wbc.world import PAYLOAD_HALF_SIZE, World
 
-FOOT_RADIUS = 0.022
-"""Radius [m] of the spherical foot, of the URDF's foot mesh and of every published MJCF."""
-ROTOR_ARMATURE = np.tile([0.0045, 0.0045, 0.0164], 4)
-"""Reflected rotor inertia [kg m^2] per joint; same provenance as the plant's ``JointDynamics``."""
 LEG_AXES = ("JointModelRX", "JointModelRY", "JointModelRY")
 """What Pinocchio calls the joints of a leg: they turn about x, y and y."""
 FINGERPRINT_DECIMALS = 9
@@ -35,8 +31,6 @@ FINGERPRINT_DECIMALS = 9
 if another Pinocchio rounds its last digits differently."""
 FINGERPRINT = 16
 """Letters of a fingerprint."""
-HIP_LIMIT = 0.838
-"""Published hip abduction limit [rad]; the URDF's 1.0472 is wider."""
 
 
 class RobotModel:
@@ -44,6 +38,7 @@ class RobotModel:
 
     Attributes:
         description: the files that the robot was loaded from.
+        profile: what they do not say of it.
         pin_model: Pinocchio's model, with rotor inertia.
         foot_radius: radius [m] of the spherical feet.
         mass: total mass [kg].
@@ -62,8 +57,8 @@ class RobotModel:
         self,
         description: RobotDescription | None = None,
         *,
-        armature: Array12 = ROTOR_ARMATURE,
-        foot_radius: float = FOOT_RADIUS,
+        armature: Array12 | None = None,
+        foot_radius: float | None = None,
         motor: str = TORQUE_SPEED,
         world: World | None = None,
     ) -> None:
@@ -71,22 +66,25 @@ class RobotModel:
 
         Args:
             description: the robot's files; by default those of the installed package.
-            armature: reflected rotor inertias [kg m^2].
-            foot_radius: radius [m] of the spherical feet; 0 puts contacts at the foot frames.
+            armature: reflected rotor inertias [kg m^2]; by default the profile's.
+            foot_radius: radius [m] of the spherical feet; 0 puts contacts at the foot frames; by
+                default the profile's.
             motor: "torque-speed", or "ideal" for the peak torque at every speed.
             world: whose load the robot carries, and by whose factor it is heavier; none by default.
 
         Raises:
             ConfigError: for an unknown motor.
-            DescriptionError: if the files are missing, broken, or not a Go2's.
+            DescriptionError: if the files are missing, broken, or not such a robot's.
         """
         self.description = description or find_description()
+        self.profile = profile = self.description.profile
         self.motor = MotorModel.named(motor, self.description)
-        self.foot_radius = foot_radius
+        self.foot_radius = profile.foot_radius if foot_radius is None else foot_radius
         self.pin_model = _load(self.description.urdf_path)
         if world is not None:
             _burden(self.pin_model, world)
-        self.pin_model.armature = np.concatenate([np.zeros(6), armature])
+        own = np.tile(profile.armature, 4) if armature is None else armature
+        self.pin_model.armature = np.concatenate([np.zeros(6), own])
         self._data = self.pin_model.createData()
         self._foot_frames = [self.pin_model.getFrameId(name) for name in FOOT_NAMES]
         self._zero_acceleration = np.zeros(18)
@@ -101,8 +99,9 @@ class RobotModel:
         self.speed_limits = np.array(model.velocityLimit[6:])
         self.q_lower = np.array(model.lowerPositionLimit[7:])
         self.q_upper = np.array(model.upperPositionLimit[7:])
-        self.q_lower[0::3] = np.maximum(self.q_lower[0::3], -HIP_LIMIT)
-        self.q_upper[0::3] = np.minimum(self.q_upper[0::3], HIP_LIMIT)
+        hip = self.profile.hip_limit
+        self.q_lower[0::3] = np.maximum(self.q_lower[0::3], -hip)
+        self.q_upper[0::3] = np.minimum(self.q_upper[0::3], hip)
         hips = [model.jointPlacements[model.getJointId(JOINT_NAMES[3 * leg])] for leg in LEGS]
         self.p_base_hips = np.array([T.translation for T in hips])
         thigh = model.jointPlacements[model.getJointId(JOINT_NAMES[1])]
@@ -127,7 +126,7 @@ class RobotModel:
             return self.pinocchio_snapshot(state, payload)
         if payload.mass:
             robot = self._loaded(robot, payload)
-        snapshot = Snapshot.of_row(state, np.empty(_SNAPSHOT_SIZE))
+        snapshot = Snapshot.of_row(state, np.empty(_SNAPSHOT_SIZE), self.profile)
         fill_snapshot(state.q, state.v, robot, snapshot)
         return snapshot
 
@@ -191,6 +190,8 @@ class RobotModel:
         drift_contacts = drift[:, :3] - self.foot_radius * np.cross(drift[:, 3:], _UP)
         return Snapshot(
             state,
+            self.profile,
+            foot_radius=self.foot_radius,
             R_world_base=state.R_world_base,
             mass_matrix=M,
             bias=h,

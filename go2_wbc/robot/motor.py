@@ -58,8 +58,6 @@ PerJoint = Annotated[tuple[float, ...], len(JOINT_NAMES)]
 TORQUE_SPEED, IDEAL = "torque-speed", "ideal"
 MOTORS = (TORQUE_SPEED, IDEAL)
 """Names of the models: with the torque-speed line, and with the peak torque at every speed."""
-KNEE_SHARE = 13.5 / 30.0
-"""Speed of the knee as a share of the speed without load; see above."""
 LEAST_SHARE = 0.05
 """Share of the peak below which ``share`` counts no torque as available, or it would not be finite
 near the speed without load; own choice."""
@@ -90,7 +88,7 @@ class MotorModel:
         speeds = np.array(description.speeds)
         zero_torque = speeds if name == TORQUE_SPEED else np.full(12, np.inf)
         peak = np.array(description.efforts)
-        return packed(MotorModel(peak, KNEE_SHARE * speeds, zero_torque))
+        return packed(MotorModel(peak, description.profile.knee_share * speeds, zero_torque))
 
     def with_peak(self, peak: Array12) -> MotorModel:
         """The same line below other torque limits [N m]."""

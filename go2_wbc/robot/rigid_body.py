@@ -405,7 +405,7 @@ def fill_snapshot(
     q: Foreign[Array19], v: Foreign[Array18], robot: RigidBodies, now: Snapshot
 ) -> None:
     """Fill a snapshot, from the measured q and v, for ``robot``."""
-    now.q[:], now.v[:] = q, v
+    now.q[:], now.v[:], now.foot_radius = q, v, robot.foot_radius
     now.mass_matrix[:], now.J_feet[:], now.J_contacts[:], now.com_shift[:] = 0.0, 0.0, 0.0, 0.0
     R = now.R_world_base
     rotation_of(q[3], q[4], q[5], q[6], R)

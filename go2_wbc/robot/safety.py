@@ -15,24 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from go2_wbc.compilation import Foreign, kernel
-from go2_wbc.records import Array4, Array12, Array18, Array19
-from go2_wbc.robot.model import FOOT_RADIUS
+from go2_wbc.records import Array4, Array12, Array18, Array19, ArrayNx3
+from go2_wbc.robot.profile import RobotProfile, find_profile
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.validation import POSITIVE, ranged
 
-TRUNK_UNDERSIDE = np.array(
-    [
-        *([-0.128, side * 0.090, -0.046] for side in (1, -1)),
-        *([-0.121, side * 0.056, -0.074] for side in (1, -1)),
-        *([0.113, side * 0.058, -0.096] for side in (1, -1)),
-        *([0.128, side * 0.094, -0.041] for side in (1, -1)),
-        *([0.260, side * 0.012, -0.107] for side in (1, -1)),
-        *([0.305, side * 0.045, -0.095] for side in (1, -1)),
-        [0.346, 0.0, -0.084],
-    ]
-)
-"""Points [m] of the trunk in the base frame that touch flat ground first, within 1 cm, at tilts up
-to 60 deg: vertices of the collision mesh of the robot description."""
 TOUCH = 0.01
 """Height [m] of the trunk's lowest point over the ground below which it touches."""
 ASTRAY_TOUCH = 0.025
@@ -60,18 +47,18 @@ def is_plausible(
 
 
 @kernel
-def heights(now: Snapshot) -> tuple[float, float]:
+def heights(now: Snapshot, underside: ArrayNx3) -> tuple[float, float]:
     """Heights [m] of the base over the lowest foot's centre, and of the trunk over the ground."""
     lowest, height = np.inf, now.q[2]
     for leg in range(4):
         lowest = min(lowest, now.p_world_feet[leg, 2])
     clearance = np.inf
-    for point in range(TRUNK_UNDERSIDE.shape[0]):
+    for point in range(underside.shape[0]):
         z = 0.0
         for i in range(3):
-            z += now.R_world_base[2, i] * TRUNK_UNDERSIDE[point, i]
+            z += now.R_world_base[2, i] * underside[point, i]
         clearance = min(clearance, z)
-    return height - lowest, height + clearance - lowest + FOOT_RADIUS
+    return height - lowest, height + clearance - lowest + now.foot_radius
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,9 +112,10 @@ class SafetyConfig:
 class FallDetector:
     """Says whether a robot that balances has fallen; asked once per tick."""
 
-    def __init__(self, config: SafetyConfig) -> None:
-        """Judge by ``config``."""
+    def __init__(self, config: SafetyConfig, profile: RobotProfile | None = None) -> None:
+        """Judge a robot, a Go2 if no ``profile`` is given, by ``config``."""
         self._config = config
+        self._underside = (profile or find_profile()).underside_points
         self.begin()
 
     def begin(self) -> None:
@@ -145,7 +133,7 @@ class FallDetector:
             may_lie: whether the belly may be on the ground.
         """
         state, config = snapshot.state, self._config
-        height, clearance = heights(snapshot)
+        height, clearance = heights(snapshot, self._underside)
         has_sunk = not may_lie and sag > config.sink_limit
         is_aslant = lean > config.lean_limit / 2
         is_off = sag > config.sink_limit / 2 or is_aslant

@@ -59,8 +59,8 @@ GYRO_LIMIT, GYRO_LASTS = 0.22, 0.07
 SETTLING_AND_LASTING = SETTLING + GYRO_LASTS
 """How long [s] an error has been there when it is found, more or less."""
 EXPLAINED = 0.8
-"""Share of the feet's squared residual that an error of the gyro explains, if it is one. A foot that
-slides off an edge and the one that stands with it seem to turn, too: with 0.3 a gyro was named
+"""Share of the feet's squared residual that an error of the gyro explains, if it is one. A foot
+that slides off an edge and the one that stands with it seem to turn, too: with 0.3 a gyro was named
 within 20 s in 6 of 7 walks over boxes of 8 cm, with this in none."""
 CARRIED, UPRIGHT = 0.7, 0.85
 """Share of the robot's weight that its legs bear while it stands or walks, and the cosine of its

@@ -20,6 +20,7 @@ from jaxtyping import Bool, Float
 from go2_wbc.brief import brief
 from go2_wbc.errors import CommandError
 from go2_wbc.records import Array3, Array3x3, Array4, Array4x3, Array12, Array18, Array19, Record
+from go2_wbc.robot.profile import RobotProfile, find_profile
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,6 +241,7 @@ class Snapshot(Record):
 
     Attributes:
         state: the measured state that everything here belongs to.
+        profile: of the robot.
         q, v: its configuration and velocity.
         R_world_base: base orientation.
         mass_matrix: M(q) with rotor inertia.
@@ -253,11 +255,13 @@ class Snapshot(Record):
         payload: mass [kg] and weight [N] of what the trunk is taken to carry; it is in all the
             dynamics above.
         com_shift: by which it moves the CoM [m] in the world.
+        foot_radius: of the spherical feet [m].
     """
 
-    __slots__ = ("state",)
+    __slots__ = ("profile", "state")
 
     state: RobotState
+    profile: RobotProfile
     q: Array19
     v: Array18
     R_world_base: Array3x3
@@ -276,9 +280,17 @@ class Snapshot(Record):
     v_world_contacts: Array4x3
     payload: Float[np.ndarray, "2"]
     com_shift: Array3
+    foot_radius: float
 
-    def __init__(self, state: RobotState, **parts: Float[np.ndarray, "..."]) -> None:
+    def __init__(
+        self,
+        state: RobotState,
+        profile: RobotProfile | None = None,
+        **parts: Float[np.ndarray, "..."] | float,
+    ) -> None:
         """From the ``state`` and the other parts by name; what is left out is 0.
+
+        Without a ``profile`` the robot is a Go2.
 
         Raises:
             CommandError: for an array of another shape than it should have.
@@ -288,22 +300,26 @@ class Snapshot(Record):
         except (ValueError, TypeError) as error:
             raise CommandError(f"snapshot: {error}") from error
         object.__setattr__(self, "state", state)
+        object.__setattr__(self, "profile", profile or find_profile())
 
     @staticmethod
-    def of_row(state: RobotState, row: Float[np.ndarray, " size"]) -> Snapshot:
+    def of_row(
+        state: RobotState, row: Float[np.ndarray, " size"], profile: RobotProfile
+    ) -> Snapshot:
         """The snapshot of ``state`` whose numbers lie in ``row``."""
         snapshot = Snapshot.of(row)
         object.__setattr__(snapshot, "state", state)
+        object.__setattr__(snapshot, "profile", profile)
         return snapshot
 
     def replaced(
-        self, state: RobotState | None = None, **parts: Float[np.ndarray, "..."]
+        self, state: RobotState | None = None, **parts: Float[np.ndarray, "..."] | float
     ) -> Snapshot:
         """A copy with another state, or other parts by name."""
         own = {
             name: getattr(self, name) for name in Snapshot.part_names() if name not in ("q", "v")
         }
-        return Snapshot(state or self.state, **(own | parts))
+        return Snapshot(state or self.state, self.profile, **(own | parts))
 
     def __reduce__(self) -> tuple[object, ...]:
-        return Snapshot.of_row, (self.state, self.row)
+        return Snapshot.of_row, (self.state, self.row, self.profile)

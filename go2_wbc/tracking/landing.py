@@ -41,7 +41,6 @@ from go2_wbc.compilation import Foreign, subroutine
 from go2_wbc.contacts import TIE
 from go2_wbc.records import Record
 from go2_wbc.reference import JOINTS, STANCE, SWING, Anchor, Target
-from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.tracking.plan_curves import StanceLoad, set_load
 
@@ -182,7 +181,7 @@ def notice(
     foot = s.feet[leg]
     may_land = foot.planned == STANCE or elapsed >= EARLIEST * duration
     if may_land and contact:
-        ground = now.p_world_feet[leg, 2] - FOOT_RADIUS
+        ground = now.p_world_feet[leg, 2] - now.foot_radius
         s.anchor.p_world[2] += PLAN_SHARE * (ground - s.anchor.p_world[2])
     elif foot.planned == STANCE and elapsed > TIME_OUT:
         s.missed += 1.0

@@ -22,7 +22,7 @@ from go2_wbc.robot.rotations import rpy_from_rotation, yaw_rotation
 from motions.batch_kinematics import attitudes, configurations, foot_centres, turned_back
 from motions.dynamics.phases import GRAVITY, KNOT_PERIOD, FullState, Phase, PhaseProblem
 from motions.dynamics.plan_limits import PlanLimits
-from motions.postures import STAND_POSE, standing_feet, standing_on
+from motions.postures import standing_feet, standing_on
 
 LEAD = 0.2
 """Share of a flight's way by which the trunk is ahead of the feet at take-off, and behind them at
@@ -124,7 +124,7 @@ def knots_of(problem: PhaseProblem, model: RobotModel, limits: PlanLimits) -> Kn
 def standing(model: RobotModel, p_feet: Float[np.ndarray, "4 3"]) -> FullState:
     """Standing at rest on feet at ``p_feet`` [m]: CoM above their middle, trunk along them."""
     anchor = Anchor.of_feet(p_feet, model.foot_radius)
-    p_com, R = anchor.p_world + STAND_POSE[:3], yaw_rotation(anchor.yaw)
+    p_com, R = anchor.p_world + model.profile.stand_pose[:3], yaw_rotation(anchor.yaw)
     p_base, joints = standing_on(p_feet, p_com, R, model)
     pose = np.concatenate([p_base, [0.0, 0.0, anchor.yaw]])
     return FullState(configurations(pose[None], joints[None])[0], np.zeros(18))

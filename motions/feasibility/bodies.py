@@ -228,7 +228,7 @@ class LinkHulls:
         points: dict[int, list[Float[np.ndarray, "m 3"]]] = {}
         for item in geometry.geometryObjects:
             if not item.name.rsplit("_", 1)[0].endswith("foot"):
-                own, T = np.array(item.geometry.points()), item.placement
+                own, T = _points(item.geometry), item.placement
                 points.setdefault(item.parentJoint, []).append(own @ T.rotation.T + T.translation)
         self.links = tuple(LinkHull.of(joint, np.vstack(points[joint])) for joint in sorted(points))
 
@@ -264,6 +264,14 @@ class LinkHulls:
                 x, z = c * x - s * z, c * z + s * x
             frames[joint] = np.column_stack([x, y, z]), height
         return frames
+
+
+def _points(geometry: coal.CollisionGeometry) -> Float[np.ndarray, "m 3"]:
+    """Of a convex body; of one that is none, as a cylinder, the corners of the box around it."""
+    if isinstance(geometry, coal.ConvexBase):
+        return np.array(geometry.points())
+    geometry.computeLocalAABB()
+    return _box(geometry.aabb_local.min_, geometry.aabb_local.max_)
 
 
 def _name(joint: int) -> str:

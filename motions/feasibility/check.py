@@ -16,6 +16,7 @@ from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import RobotProfile
 from go2_wbc.world import World
 from motions.authoring import Motion
 from motions.batch_kinematics import centres_of_mass
@@ -115,7 +116,7 @@ def compile_motion(
         return motion
     if isinstance(motion, str | Path) and is_saved_plan(motion):
         return load_plan(motion, model=model)
-    line = timeline_of(motion)
+    line = timeline_of(motion, model.profile)
     if line is None:
         raise CommandError(
             "motion must be a name of the library, a function with @motion before it, a Timeline, "
@@ -125,14 +126,17 @@ def compile_motion(
     return compile_timeline(line, model, mend=asked, progress=progress)
 
 
-def timeline_of(motion: object) -> Timeline | None:
+def timeline_of(motion: object, profile: RobotProfile | None = None) -> Timeline | None:
     """The timeline of ``motion``; of a plan, or of what stands for no motion, none.
+
+    One of the library is as the robot of ``profile`` does it, by default a Go2.
 
     Raises:
         CommandError: for an unknown name.
     """
     if isinstance(motion, str | Path):
-        return None if is_saved_plan(motion) else load_motion(motion)
+        own = {} if profile is None else profile.motions.get(str(motion), {})
+        return None if is_saved_plan(motion) else load_motion(motion, **own)
     if isinstance(motion, Motion):
         return motion()
     return motion if isinstance(motion, Timeline) else None

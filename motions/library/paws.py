@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from go2_wbc.robot.model import FOOT_RADIUS
+from go2_wbc.robot.profile import find_profile
 from motions import Choice, Range, Timeline, deg, motion
 
 Side = Annotated[str, Choice("left", "right")]
@@ -36,6 +36,8 @@ def wave(
 
 HEIGHT = 0.64
 """Height [m] above the ground at which the paw's centre is held by default."""
+REACH, TAP = 0.177, 0.034
+"""Distance [m] of the paw ahead of where it stood, and how much farther it taps."""
 FOLDED = (-0.10, -0.30, -2.0)
 """Hip, thigh and calf angle [rad] of a raised right leg on its way up: the knee goes first."""
 
@@ -43,8 +45,9 @@ FOLDED = (-0.10, -0.30, -2.0)
 @motion
 def high_five(
     side: Side = "right",
-    height: Annotated[float, Range(0.45, 0.66, "m")] = HEIGHT,
+    height: Annotated[float, Range(0.25, 0.66, "m")] = HEIGHT,
     hold: Annotated[float, Range(0.5, 30.0, "s")] = 2.0,
+    reach: Annotated[float, Range(0.1, 0.4, "m")] = REACH,
 ) -> Timeline:
     """High five: three feet on the ground, a paw up, two taps, and back.
 
@@ -52,7 +55,7 @@ def high_five(
     once: CoM to the edges of the support triangle, load of the lightest foot, torque, and distance
     of every joint to its limits.
     """
-    up = height - FOOT_RADIUS
+    up = height - find_profile().foot_radius
     hip, thigh, calf = FOLDED
     right = (
         Timeline()
@@ -63,14 +66,14 @@ def high_five(
         .leg("FR", hip=hip, thigh=thigh, calf=calf, over=0.6)
         .also()
         .body(roll=deg(-2.3), pitch=deg(-9.2), yaw=deg(-1.7), z=0.016, over=0.6)
-        .foot("FR", x=0.177, y=0.082, z=up, over=0.6)
+        .foot("FR", x=reach, y=0.082, z=up, over=0.6)
         .also()
         .body(roll=deg(-4.0), pitch=deg(-17.2), yaw=deg(-2.9), z=0.026, over=0.6)
         .hold(hold, name="held", foot="FR")
     )
     for _ in range(2):
-        right = right.foot("FR", x=0.211, y=0.082, z=up - 0.026, over=0.35)
-        right = right.foot("FR", x=0.177, y=0.082, z=up, over=0.35)
+        right = right.foot("FR", x=reach + TAP, y=0.082, z=up - 0.026, over=0.35)
+        right = right.foot("FR", x=reach, y=0.082, z=up, over=0.35)
     right = (
         right.leg("FR", hip=hip, thigh=thigh, calf=calf, over=0.6)
         .also()

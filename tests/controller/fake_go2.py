@@ -19,9 +19,12 @@ from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.trunk import BodyPose
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import RobotState
 from motions import CompiledPlan, FeasibilityChecker, Playable
-from motions.postures import SIT_POSE, STAND_HEIGHT
+
+STAND_HEIGHT = find_profile().stand_height
+SIT_POSE = find_profile().sit_pose
 
 PERIOD = 0.01
 """Time [s] between two samples."""

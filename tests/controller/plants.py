@@ -16,9 +16,11 @@ import pytest
 from controller.behaviours.joints import DAMPING
 from go2_wbc.plant import MujocoPlant, Plant
 from go2_wbc.reference import Reference
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import JointCommand, RobotState, Snapshot
 from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
-from motions.postures import TUCKED_JOINTS
+
+TUCKED_JOINTS = find_profile().tucked_joints
 
 # s; twice the usual control period: the robot stands alike and the tests take half the time.
 PERIOD = 0.004

@@ -11,12 +11,15 @@ from controller.modes import Aborted
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import HeldFoot, MotionPlan, Posture
 from go2_wbc.reference import Reference
-from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.tracking.landing import Landings
 from go2_wbc.tracking.plan_tracking import Deviation
 from tests.controller.plants import StillPlant
 from tests.engine_helpers import standing_q, state_of
+
+FOOT_RADIUS = find_profile().foot_radius
 
 MODEL = RobotModel()
 FIRST = HeldFoot("first", Leg.FR, 1.0, 2.0, 0.3)

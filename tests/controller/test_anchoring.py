@@ -10,10 +10,13 @@ from controller.behaviours.anchoring import APPROACH, FARTHEST, Approach, anchor
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.reference import Anchor, Target
-from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.state import RobotState
 from motions import compile_motion
+
+FOOT_RADIUS = find_profile().foot_radius
 
 Feet = Float[np.ndarray, "4 3"]
 STEP = 1e-4
@@ -44,7 +47,7 @@ def beside_line(plan: MotionPlan, anchor: Anchor, feet: Feet, pair: list[Leg]) -
 
 def test_above_two_feet_a_plan_is_played_over_their_line(pair: MotionPlan) -> None:
     feet = feet_beside(pair, 0.008)
-    anchor, of_feet = anchor_of(pair, feet), Anchor.of_feet(feet, FOOT_RADIUS)
+    anchor, of_feet = anchor_of(pair, feet, FOOT_RADIUS), Anchor.of_feet(feet, FOOT_RADIUS)
     for legs in ([Leg.FR, Leg.RL], [Leg.FL, Leg.RR]):
         assert abs(beside_line(pair, of_feet, feet, legs)) > 1e-4
         assert beside_line(pair, anchor, feet, legs) == pytest.approx(0.0, abs=1e-9)
@@ -56,7 +59,7 @@ def test_feet_far_from_their_places_move_a_plan_no_farther_than_feet_stand_besid
     pair: MotionPlan,
 ) -> None:
     feet = feet_beside(pair, 0.2)
-    moved = anchor_of(pair, feet).p_world - Anchor.of_feet(feet, FOOT_RADIUS).p_world
+    moved = anchor_of(pair, feet, FOOT_RADIUS).p_world - Anchor.of_feet(feet, FOOT_RADIUS).p_world
     assert np.linalg.norm(moved) == pytest.approx(FARTHEST)
 
 
@@ -66,7 +69,7 @@ def test_what_never_stands_on_two_feet_is_played_in_the_frame_of_the_feet(
 ) -> None:
     plan = compile_motion(name, model)
     feet = feet_beside(plan, 0.008)
-    anchor, of_feet = anchor_of(plan, feet), Anchor.of_feet(feet, FOOT_RADIUS)
+    anchor, of_feet = anchor_of(plan, feet, FOOT_RADIUS), Anchor.of_feet(feet, FOOT_RADIUS)
     np.testing.assert_array_equal(anchor.p_world, of_feet.p_world)
 
 

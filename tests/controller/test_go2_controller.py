@@ -12,7 +12,7 @@ import pytest
 from controller import GO2Controller, Mode, Outcome
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ModeError, MotionInfeasible, StanceMismatch
-from go2_wbc.planning.envelopes import TROT
+from go2_wbc.planning.envelopes import trot_of
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
@@ -259,7 +259,7 @@ def test_a_command_beyond_the_envelope_is_clipped_and_logged(
         assert not caplog.records
         go2.move(9.0)
     assert "clipped from VelocityCommand(linear_x=9.0" in caplog.text
-    assert go2.command.linear_x == TROT.forward
+    assert go2.command.linear_x == trot_of().forward
     go2.move(-9.0, 9.0, linear_y=9.0)
     assert -3.0 < go2.command.linear_x < 0.0
     go2.stop()

@@ -26,12 +26,14 @@ from go2_wbc.reference import Reference
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import MOTORS
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.problem import SIZE, Rows
 from go2_wbc.wbc.tasks import Task
-from motions.postures import STAND_HEIGHT
 from tests.controller.plants import WatchedPlant
+
+STAND_HEIGHT = find_profile().stand_height
 
 
 def test_without_the_robots_files_the_error_says_what_to_install(

@@ -19,13 +19,15 @@ from go2_wbc.planning.command import ZERO_COMMAND
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.reference import JointReference, Reference
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.safety import SafetyConfig
 from go2_wbc.robot.state import RobotState, Snapshot
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
 from go2_wbc.wbc.relaxation import LIMITS
-from motions.postures import TUCKED_JOINTS
 from tests.controller.plants import PERIOD, StillPlant, break_qp, is_limp
+
+TUCKED_JOINTS = find_profile().tucked_joints
 
 SAFETY = SafetyConfig()
 # Ticks that a silent plant is borne with.

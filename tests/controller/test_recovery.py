@@ -14,10 +14,12 @@ from controller.checks import unfolded_legs
 from go2_wbc.legs import Leg
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import JointCommand, RobotState
-from motions.postures import TUCKED_JOINTS
 from tests.controller.plants import PERIOD, WatchedPlant
 from tests.engine_helpers import state_of
+
+TUCKED_JOINTS = find_profile().tucked_joints
 
 # rad; the rear thigh points ahead, beside the trunk, at its limit.
 WRAPPED = (0.0, 4.5, -2.0)

@@ -20,9 +20,9 @@ from controller.runner import Runner
 from controller.telemetry import Telemetry
 from go2_wbc.errors import ClosedError, ModeError, PlantTimeout
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.safety import SafetyConfig
 from go2_wbc.wbc.controller import WholeBodyController
-from motions.postures import TUCKED_JOINTS
 from tests.controller.plants import (
     HANG_GUARD,
     PERIOD,
@@ -31,6 +31,8 @@ from tests.controller.plants import (
     interrupt_somewhere_in,
     is_limp,
 )
+
+TUCKED_JOINTS = find_profile().tucked_joints
 
 # s of robot time; far more than any of these tests lets pass.
 FOREVER = 1e6

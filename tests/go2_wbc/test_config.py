@@ -96,7 +96,7 @@ def test_one_half_of_a_nested_table_may_be_left_out(tmp_path: Path) -> None:
         (
             "speed = 1",
             r"unknown key 'speed'; valid: backend, envelope, estimator, feasibility, locomotion,"
-            " motor, payload, pose, safety, wbc",
+            " motor, payload, pose, robot, safety, wbc",
         ),
         ("[wbc]\nsolvr = 'daqp'", r"mine\.toml: wbc: unknown key 'solvr'; valid: .*solver"),
         ("[wbc.swing_foot]\nki = [1, 1, 1]", r"wbc: swing_foot: unknown key 'ki'; valid: kd, kp"),

@@ -12,18 +12,14 @@ from go2_wbc.curves import Curve, Ease
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.reference import LegTask, TrackedPoint
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.rotations import rotation_from_rpy
-from motions.postures import (
-    LIE_POSE,
-    NORMAL_FORCE_MAX,
-    SIT_POSE,
-    STAND_POSE,
-    PosturePlan,
-    lie_down,
-    rise,
-    sit_down,
-)
+from motions.postures import NORMAL_FORCE_MAX, PosturePlan, lie_down, rise, sit_down
 from tests.engine_helpers import angular_velocity_from_rpy
+
+STAND_POSE = find_profile().stand_pose
+SIT_POSE = find_profile().sit_pose
+LIE_POSE = find_profile().lie_pose
 
 # m; with 3 cm the leg's determinant is a third of that of a leg that still moves smoothly.
 LEAST_DROP = 0.03

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 import sys
 import tempfile
 import tomllib
@@ -13,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from tests.mutation.operators import Mutant, draw, mutants_of
-from tests.mutation.runner import Outcome, Sandbox, nearest_tests
+from tests.mutation.runner import Outcome, Sandbox, nearest_tests, own_tests
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PACKAGES: tuple[str, ...] = ("go2_wbc", "motions", "viz", "controller")
@@ -24,11 +23,10 @@ EQUIVALENT = Path(__file__).with_name("equivalent.toml")
 LATE = ("test_seeded_faults.py", "test_pytest_plugin.py", "test_*browser.py")
 STAGES = NEAR, PACKAGE, SUITE = "module", "package", "suite"
 ALIVE, TIMEOUT = "alive", "timeout"
-# CPU time [s] after which a mutant hangs: some times what the good code takes, and compiling.
-LIMITS = {NEAR: 90.0, PACKAGE: 600.0, SUITE: 3600.0}
-# The same where nothing is compiled; plain Python may be slow, so no mutant is judged by it.
-PLAIN_LIMIT = 40.0
-_COMPILED = re.compile(rb"^@(kernel|subroutine)", re.MULTILINE)
+PLAIN = "plain"
+# CPU time [s] after which a mutant hangs: some times what the good code takes, and compiling. Plain
+# Python may take longer, so nothing is judged by its time.
+LIMITS = {PLAIN: 40.0, NEAR: 90.0, PACKAGE: 600.0, SUITE: 3600.0}
 
 
 def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
@@ -69,7 +67,7 @@ def package_mutants(root: Path, package: str) -> list[Mutant]:
 class Judge:
     """Tests a mutant: by its module's own tests, its package's fast ones, then the whole suite.
 
-    Compiling takes most of the time, so the first tests of a module with kernels run plain.
+    Most are noticed by the module's own tests, which run first, and plain: compiling takes long.
     """
 
     def __init__(self, sandbox: Sandbox, *, last: str) -> None:
@@ -87,8 +85,8 @@ class Judge:
             (PACKAGE, [f"tests/{mutant.path.split('/')[0]}"], self._late | {*near}, "not slow"),
             *((SUITE, ["tests"], set[str](), marker) for marker in ("not slow", "slow")),
         ]
-        if near and _COMPILED.search((self._sandbox.home / mutant.path).read_bytes()):
-            outcome = self._test(mutant, near, self._late, "not slow", PLAIN_LIMIT, plain=True)
+        if own := [name for name in near if name in own_tests(self._sandbox.home, mutant.path)]:
+            outcome = self._test(mutant, own, self._late, "not slow", LIMITS[PLAIN], plain=True)
             if not outcome.passed and not outcome.is_late:
                 return NEAR, outcome
         outcome = Outcome(True, "", 0.0)

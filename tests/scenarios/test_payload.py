@@ -13,7 +13,10 @@ from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.payload import NO_PAYLOAD
 from go2_wbc.robot.payload_estimation import PayloadConfig
-from motions.postures import STAND_POSE, lean
+from go2_wbc.robot.profile import find_profile
+from motions.postures import lean
+
+STAND_POSE = find_profile().stand_pose
 
 LEVEL = np.radians(1.5)  # in the mean; measured 0.4 deg, without the estimate 17
 MASS_ERROR = 0.3  # [kg]; measured 0.15

@@ -7,7 +7,10 @@ from jaxtyping import Float
 
 from go2_wbc.legs import Leg
 from go2_wbc.recording import Recording
-from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
+
+FOOT_RADIUS = find_profile().foot_radius
 
 _LINK = 0.213  # [m] length of thigh and calf
 _STEP, _PERIOD, _DUTY, _APEX = 0.16, 0.5, 0.6, 0.07  # [m], [s], -, [m]

@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from go2_wbc.legs import LEGS
 from go2_wbc.recording import Recording
-from go2_wbc.robot.model import FOOT_RADIUS
+from go2_wbc.robot.profile import find_profile
 from viz.content import Annotation
 from viz.render.camera import Camera
 from viz.render.framing import camera_path, heading_path, nearest_rows
@@ -160,7 +160,7 @@ class FrameRenderer:
 
     def _arrows(self, k: int) -> list[Surface]:
         recording = self._recording
-        feet = self._robot.feet(recording.q[k]) - [0.0, 0.0, FOOT_RADIUS]
+        feet = self._robot.feet(recording.q[k]) - [0.0, 0.0, find_profile().foot_radius]
         return [
             arrow(foot, float(force) * _METRES_PER_NEWTON, 0.006, rgb(FORCE))
             for foot, force in zip(feet, recording.foot_forces[k], strict=True)

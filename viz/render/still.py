@@ -13,7 +13,7 @@ from PIL import Image, ImageDraw
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.recording import Recording, Span
-from go2_wbc.robot.model import FOOT_RADIUS
+from go2_wbc.robot.profile import find_profile
 from viz.content import check_recording
 from viz.render.frame_renderer import FrameRenderer, ShotStyle
 from viz.render.framing import nearest_rows
@@ -84,7 +84,9 @@ def _interesting_spans(spans: Sequence[Span]) -> list[Span]:
 def _telling_time(recording: Recording, robot: PosedRobot, span: Span) -> float:
     times = np.linspace(span.start, span.end, _CANDIDATES + 2)[1:-1]
     rows = nearest_rows(recording, times)
-    heights = [robot.feet(recording.q[row])[:, 2].max() - FOOT_RADIUS for row in rows]
+    heights = [
+        robot.feet(recording.q[row])[:, 2].max() - find_profile().foot_radius for row in rows
+    ]
     best = int(np.argmax(heights))
     if heights[best] > _LIFTED:
         return float(times[best])

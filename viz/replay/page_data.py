@@ -11,7 +11,7 @@ from jaxtyping import Float
 from go2_wbc.legs import LEGS
 from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
-from go2_wbc.robot.model import FOOT_RADIUS
+from go2_wbc.robot.profile import find_profile
 from viz.content import MarginCurve, ReplayContent, Verdict
 from viz.render.framing import smoothed
 from viz.render.robot_meshes import PosedRobot, load_robot_visuals
@@ -34,7 +34,7 @@ def scene_text() -> str:
     pack = Pack()
     scene = robot_scene(load_robot_visuals(), pack)
     legs = {"legs": [leg.name for leg in LEGS], "leg_colors": LEG_COLORS}
-    return pack.packed({**scene, **legs, "foot_radius": FOOT_RADIUS})
+    return pack.packed({**scene, **legs, "foot_radius": find_profile().foot_radius})
 
 
 def content_text(content: ReplayContent, title: str, version: str = "") -> str:

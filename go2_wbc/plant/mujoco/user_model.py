@@ -1,11 +1,11 @@
-"""Loads a user's own Go2 MJCF or scene, checks it, and adds what may be added.
+"""Loads a user's own MJCF or scene of a robot, checks it, and adds what may be added.
 
-The file must have the Go2's twelve joints below one body with a free joint, and its four feet as
+The file must have the robot's twelve joints below one body with a free joint, and its four feet as
 bodies ``FL_foot`` or geoms ``FL_foot`` or ``FL``. Added when absent: a floor, a torque motor for a
 joint that no actuator drives, and the IMU. It must have the size of the robot that is controlled:
-another robot with joints of these names is refused. Everything else stays as the file says, except
-that the time step is the plant's and keyframes are not used. An actuator that is not a plain torque
-motor is refused, never replaced.
+another robot with joints of these names is refused, and named if there is a profile of it.
+Everything else stays as the file says, except that the time step is the plant's and keyframes are
+not used. An actuator that is not a plain torque motor is refused, never replaced.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ from go2_wbc.plant.mujoco.model import (
     add_motors,
     set_joint_dynamics,
 )
-from go2_wbc.robot.description import RobotDescription
+from go2_wbc.robot.description import RobotDescription, find_description
+from go2_wbc.robot.profile import profile_names
 
 _BASE_FALLBACK = "go2_wbc_base"
 MASS_RATIO = 1.6
@@ -61,16 +62,17 @@ def load_user_model(
     """
     spec = _read(mjcf)
     problems = _joint_problems(spec) + _foot_problems(spec) + _actuator_problems(spec)
-    problems = problems or _size_problems(_compiled(spec, mjcf), description)
+    problems = problems or _other_robot(_compiled(spec, mjcf), description)
     if problems:
+        title = description.profile.title
         listing = "".join(f"\n  - {problem}" for problem in problems)
-        raise ModelMismatch(f"{mjcf} cannot be driven as a Go2:{listing}")
+        raise ModelMismatch(f"{mjcf} cannot be driven as a {title}:{listing}")
     base = _root(spec.joint(JOINT_NAMES[0]))
     base.name = base.name or _BASE_FALLBACK
     driven = {actuator.target for actuator in spec.actuators if is_on_joint(actuator)}
     add_motors(spec, [name for name in JOINT_NAMES if name not in driven], description)
     if all(sensor.name != GYRO for sensor in spec.sensors):  # else it is an export of our own
-        add_imu(spec, base.name)
+        add_imu(spec, base.name, description.profile)
     if not _has_ground(spec):
         add_floor(spec)
     if joint_dynamics is not None:
@@ -149,6 +151,18 @@ def _compiled(spec: mujoco.MjSpec, mjcf: Path | str) -> mujoco.MjModel:
         return spec.copy().compile()
     except ValueError as error:
         raise ModelMismatch(f"MuJoCo cannot compile {mjcf}: {error}") from error
+
+
+def _other_robot(model: mujoco.MjModel, description: RobotDescription) -> list[str]:
+    """What makes it another robot than that of ``description``, and which one it is, if known."""
+    problems = _size_problems(model, description)
+    if not problems:
+        return []
+    for name in profile_names():
+        other = find_description(robot=name)
+        if not _size_problems(model, other):
+            problems.append(f"it has the size of a {other.profile.title}: give robot={name!r}")
+    return problems
 
 
 def _size_problems(model: mujoco.MjModel, description: RobotDescription) -> list[str]:

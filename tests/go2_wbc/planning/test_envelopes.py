@@ -14,11 +14,11 @@ from go2_wbc.planning.envelopes import (
     DWELL,
     FULL,
     LADDER,
-    TROT,
     UP,
     GaitChoice,
     envelope_of,
     measured_envelopes,
+    trot_of,
 )
 
 TICK = 0.02
@@ -31,7 +31,7 @@ def test_every_named_gait_has_a_measured_envelope() -> None:
 
 
 def test_the_default_envelope_of_the_trot_is_inside_what_was_measured() -> None:
-    own, measured = astuple(TROT), astuple(measured_envelopes()["trot"])
+    own, measured = astuple(trot_of()), astuple(measured_envelopes()["trot"])
     assert all(a <= b for a, b in zip(own, measured, strict=True))
 
 
@@ -46,7 +46,7 @@ def test_an_envelope_that_is_configured_scales_those_of_the_other_gaits(name: st
 def test_where_nothing_is_configured_only_the_trot_is_taken_to_what_was_measured_of_it() -> None:
     # Of the others the edge was measured in one direction at a time, on the true state.
     own = Gait("mine", 0.4, 0.6, (0.0, 0.5, 0.5, 0.0), envelope_share=0.4)
-    assert envelope_of(GAITS["trot"], None) == TROT
+    assert envelope_of(GAITS["trot"], None) == trot_of()
     for gait in (own, *(gait for gait in GAITS.values() if gait.name != "trot")):
         assert envelope_of(gait, None) == envelope_of(gait, USUAL)
 

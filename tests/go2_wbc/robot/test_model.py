@@ -12,15 +12,12 @@ import pytest
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.robot.description import find_description
-from go2_wbc.robot.model import (
-    FINGERPRINT,
-    FOOT_RADIUS,
-    HIP_LIMIT,
-    ROTOR_ARMATURE,
-    RobotModel,
-    fingerprint,
-)
+from go2_wbc.robot.model import FINGERPRINT, RobotModel, fingerprint
+from go2_wbc.robot.profile import find_profile
 from tests.engine_helpers import random_state
+
+HIP_LIMIT = find_profile().hip_limit
+FOOT_RADIUS = find_profile().foot_radius
 
 EXACT = 1e-12  # rounding of numbers of order one
 MESH_TOLERANCE = 1e-3  # [m]; the fitted sphere has 22.9 mm and sits 2.6 mm behind the frame
@@ -93,7 +90,7 @@ def test_the_rotors_add_their_inertia_to_the_diagonal_of_the_joints_only() -> No
     state = random_state(np.random.default_rng(2))
     geared = RobotModel().snapshot(state).mass_matrix
     bare = RobotModel(armature=np.zeros(12)).snapshot(state).mass_matrix
-    expected = np.diag(np.concatenate([np.zeros(6), ROTOR_ARMATURE]))
+    expected = np.diag(np.concatenate([np.zeros(6), np.tile(find_profile().armature, 4)]))
     np.testing.assert_allclose(geared - bare, expected, atol=EXACT)
 
 

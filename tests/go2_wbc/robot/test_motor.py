@@ -14,7 +14,6 @@ from go2_wbc.errors import ConfigError
 from go2_wbc.records import packed
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import (
-    KNEE_SHARE,
     LEAST_SHARE,
     MOTORS,
     FrictionFeedForward,
@@ -23,10 +22,13 @@ from go2_wbc.robot.motor import (
     drive,
     note_peaks,
 )
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import JointCommand, RobotState
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WholeBodyController
 from tests.engine_helpers import cases, random_state
+
+KNEE_SHARE = find_profile().knee_share
 
 MODEL = RobotModel()
 LINE = MODEL.motor

@@ -151,5 +151,7 @@ def test_compiled_is_plain() -> None:
     robot = MODEL._bodies
     assert robot is not None
     for numbers in (robot, MODEL._loaded(robot, Payload(3.0, (0.1, -0.05, 0.1)))):
-        snapshot = Snapshot.of_row(state, np.full(len(MODEL.snapshot(state).row), np.nan))
+        snapshot = Snapshot.of_row(
+            state, np.full(len(MODEL.snapshot(state).row), np.nan), MODEL.profile
+        )
         assert_plain_is_compiled(fill_snapshot, state.q, state.v, numbers, snapshot)

@@ -11,17 +11,15 @@ import pytest
 from go2_wbc.errors import ConfigError
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.description import BASE_LINK
-from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
-from go2_wbc.robot.safety import (
-    TRUNK_UNDERSIDE,
-    FallDetector,
-    SafetyConfig,
-    heights,
-    is_plausible,
-)
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
+from go2_wbc.robot.safety import FallDetector, SafetyConfig, heights, is_plausible
 from go2_wbc.robot.state import Snapshot
 from tests.compiled import assert_plain_is_compiled
 from tests.engine_helpers import random_state, standing_q, state_of
+
+TRUNK_UNDERSIDE = find_profile().underside_points
+FOOT_RADIUS = find_profile().foot_radius
 
 # m; how closely few points can stand for the mesh of the trunk.
 POINT_TOLERANCE = 0.01
@@ -95,7 +93,7 @@ def test_heights_are_over_the_lowest_foot() -> None:
         snapshot = MODEL.snapshot(random_state(rng))
         lowest = float(snapshot.p_world_feet[:, 2].min())
         expected = (snapshot.q[2] - lowest, clearance(snapshot, lowest - FOOT_RADIUS))
-        assert heights(snapshot) == pytest.approx(expected, abs=1e-12)
+        assert heights(snapshot, TRUNK_UNDERSIDE) == pytest.approx(expected, abs=1e-12)
 
 
 def test_a_standing_robot_has_not_fallen(falls: FallDetector) -> None:
@@ -252,5 +250,5 @@ def test_a_quaternion_must_be_of_length_one() -> None:
 
 def test_compiled_is_plain() -> None:
     state = random_state(np.random.default_rng(14))
-    assert_plain_is_compiled(heights, MODEL.snapshot(state))
+    assert_plain_is_compiled(heights, MODEL.snapshot(state), TRUNK_UNDERSIDE)
     assert_plain_is_compiled(is_plausible, state.q, state.v, state.tau, state.foot_forces)

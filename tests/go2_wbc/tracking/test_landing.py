@@ -9,7 +9,8 @@ import pytest
 
 from go2_wbc.legs import Leg
 from go2_wbc.reference import Anchor, LegTask, Reference, Target
-from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.tracking.landing import (
     EARLIEST,
     NEAR,
@@ -26,6 +27,8 @@ from go2_wbc.tracking.plan_tracking import PlanTracker
 from motions.plan.compiled_plan import CompiledPlan
 from tests.engine_helpers import standing_q, state_of
 from tests.stepping_plans import LANDING, LIFT_OFF, TAKE_OFF, TOUCHDOWN, hop_plan, step_plan
+
+FOOT_RADIUS = find_profile().foot_radius
 
 MODEL = RobotModel()
 TICK = 0.002

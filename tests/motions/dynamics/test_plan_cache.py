@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from go2_wbc.errors import PlanNotFound
-from go2_wbc.robot.model import ROTOR_ARMATURE, RobotModel
+from go2_wbc.robot.model import RobotModel
 from motions.dynamics import DynamicTrajectory, PhaseProblem, PlanLimits, Tolerance, plan_cache
 from tests.motions.dynamics.conftest import PROBLEMS
 
@@ -44,7 +44,7 @@ def test_a_kept_plan_is_not_solved_again(solver: Solver, model: RobotModel, tmp_
 def test_another_question_robot_or_limit_is_another_plan(
     solver: Solver, model: RobotModel, tmp_path: Path
 ) -> None:
-    heavier = RobotModel(armature=1.1 * ROTOR_ARMATURE)
+    heavier = RobotModel(armature=1.1 * model.pin_model.armature[6:])
     ideal = RobotModel(motor="ideal")
     longer = replace(PROBLEM.phases[0], duration=0.42)
     others = [

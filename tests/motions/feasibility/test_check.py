@@ -11,11 +11,11 @@ from go2_wbc.errors import CommandError, MotionInfeasible
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline, deg, load_motion
 from motions.feasibility import FeasibilityReport
 from motions.feasibility.forces import forces_of, state_at
 from motions.plan.trajectory import trajectory_of
-from motions.postures import STAND_HEIGHT
 from tests.motions.doctored import (
     STRETCHED,
     DoctoredPlan,
@@ -24,6 +24,8 @@ from tests.motions.doctored import (
     with_joint_beyond_its_limit,
     with_joint_too_fast,
 )
+
+STAND_HEIGHT = find_profile().stand_height
 
 # m, N, N m; of quantities that two ways of calculating give, one of them by a spline.
 EXACT = 1e-6

@@ -6,10 +6,13 @@ import numpy as np
 
 from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from motions import Timeline
 from motions.language.footing import Footing
 from motions.plan.tracks import Instants, LegTracks
-from motions.postures import STAND_POSE, standing_feet
+from motions.postures import standing_feet
+
+STAND_POSE = find_profile().stand_pose
 
 FAR = 0.6  # m; ahead of where the foot stands, out of its leg's reach
 

@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 from go2_wbc.legs import LEGS
-from go2_wbc.robot.model import FOOT_RADIUS
+from go2_wbc.robot.profile import find_profile
 from viz.render.camera import Camera
 from viz.render.floor import paint_floor
 from viz.render.mesh import Surface
 from viz.render.rasterizer import rasterize
 from viz.render.renderer import render, towards_lights
 from viz.render.robot_meshes import PosedRobot, load_robot_visuals
+
+FOOT_RADIUS = find_profile().foot_radius
 
 _TOUCH = 2.5  # [px] sole in the picture against the projected contact point
 

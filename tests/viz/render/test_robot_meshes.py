@@ -8,9 +8,11 @@ import pytest
 
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.description import find_description
-from go2_wbc.robot.model import FOOT_RADIUS
+from go2_wbc.robot.profile import find_profile
 from viz.render.mesh import arrow
 from viz.render.robot_meshes import PosedRobot, load_robot_visuals
+
+FOOT_RADIUS = find_profile().foot_radius
 
 _MESH_ERROR = 0.002  # [m] the foot's mesh is not exactly the sphere of the contact model
 _STAND = np.concatenate([[0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0], np.tile([0.0, 0.8, -1.5], 4)])

@@ -11,10 +11,12 @@ from controller.behaviours.joints import DAMPING
 from controller.bridges.unitree.guards import GuardConfig, Guards, is_passive, require_sane
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.rotations import quaternion_from_rpy
 from go2_wbc.robot.state import JointCommand, RobotState
-from motions.postures import TUCKED_JOINTS
 from tests.controller.plants import lying_state
+
+TUCKED_JOINTS = find_profile().tucked_joints
 
 TAU = JointCommand.torque(np.full(12, 5.0))
 RAMP = GuardConfig().ramp_time

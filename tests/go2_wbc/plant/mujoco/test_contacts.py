@@ -11,10 +11,12 @@ import pytest
 from go2_wbc.errors import CommandError
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.robot.model import FOOT_RADIUS
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import JointCommand
 from tests.go2_wbc.plant.contract import DAMPED
 from tests.go2_wbc.plant.helpers import GRAVITY, STAND, fly, momentum, stand_up
+
+FOOT_RADIUS = find_profile().foot_radius
 
 # The contacts of a lying robot creep a little: dry friction and limits are soft constraints.
 STATIC_TOLERANCE = 5e-3

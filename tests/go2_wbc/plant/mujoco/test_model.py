@@ -25,9 +25,11 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.model import PAYLOAD_BODY, JointDynamics
 from go2_wbc.plant.terrain import Boxes, Patch, Ramp, Slope, Stairs, Terrain
 from go2_wbc.robot.description import find_description
-from go2_wbc.robot.model import FOOT_RADIUS
+from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import JointCommand
 from tests.go2_wbc.plant.helpers import STAND
+
+FOOT_RADIUS = find_profile().foot_radius
 
 TOTAL_MASS = 16.085  # kg, the sum of the URDF's links
 # Relative, in the norm of agreement.py. Both engines do a few hundred roundings of 1e-16 with a
