@@ -151,11 +151,11 @@ def measure_disturbed(trial: Trial, found: TrialResult) -> None:
         watch = Watch(robot, rng)
         robot.truth.on_tick = watch.look
         for _ in range(CALLS):
-            _make(robot, watch, str(rng.choice(CALLED)), rng)
+            make(robot, watch, str(rng.choice(CALLED)), rng)
             for _ in range(RECOVERIES):
                 if robot.go2.mode not in DOWN:
                     break
-                _make(robot, watch, "recover", rng)
+                make(robot, watch, "recover", rng)
         robot.go2.wait(1.0)
         if math.isinf(watch.delay):  # it fell just now: whether that is noticed is not known yet
             robot.go2.wait(2.0 * NOTICED)
@@ -167,7 +167,7 @@ def measure_disturbed(trial: Trial, found: TrialResult) -> None:
         found.failures["delay"] = "; ".join(late)
 
 
-def _make(robot: TrialRobot, watch: Watch, what: str, rng: np.random.Generator) -> None:
+def make(robot: TrialRobot, watch: Watch, what: str, rng: np.random.Generator) -> None:
     """One call that may end in a fall, and time after it."""
     go2 = robot.go2
     watch.may_lie, watch.call = what == "lie_down", what

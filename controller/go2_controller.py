@@ -476,14 +476,15 @@ class GO2Controller:
         except Go2WbcError as error:
             self._note(call, str(error))
             raise
-        told = "done" if self.health.is_sound else f"done; {self.health}"
-        self._note(call, told, measured, ok=True)
+        self._note(call, "done", measured, ok=True)
         return True
 
     def _note(
         self, call: _Call, reason: str, measured: Measurements | None = None, *, ok: bool = False
     ) -> None:
-        """What came of ``call``."""
+        """What came of ``call``, and which parts are broken that the reason does not name."""
+        if untold := [str(f) for f in self.health.faults if str(f) not in reason]:
+            reason = "; ".join([reason, *untold])
         duration = self._runner.loop.state.time - call.start
         self._last = Outcome(ok, reason, duration, dict(measured or {}))
         fault = self._runner.loop.fault

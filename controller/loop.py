@@ -17,12 +17,15 @@ from contextlib import suppress
 from dataclasses import dataclass
 from math import inf, isfinite
 
+import numpy as np
+
 from controller.behaviours import Behaviour
 from controller.behaviours.joints import DAMPING, Damped
 from controller.telemetry import Telemetry
 from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible
 from go2_wbc.plant.base import Plant
-from go2_wbc.reference import JointReference, Reference, Target, sag_and_lean
+from go2_wbc.reference import JointReference, Reference, Target, feet_astray, sag_and_lean
+from go2_wbc.robot.foot_watch import ASTRAY, FootWatch
 from go2_wbc.robot.latency import LAGS, Latency
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor_watch import MotorWatch
@@ -102,7 +105,7 @@ class ControlLoop:
         self.latency = Latency(plant.control_period)
         self._ahead = self.state
         self._payloads = payloads
-        self._motors = MotorWatch(model.motor)
+        self._motors, self._feet, self._astray = MotorWatch(model.motor), FootWatch(), np.zeros(4)
         self.health = Health()
         self._commands = deque([JointCommand.damping(DAMPING)], LAGS)
         self._unanswered = 0
@@ -154,13 +157,13 @@ class ControlLoop:
             # What a limp robot's joint is asked for changes with its speed, also within a tick.
             is_limp = isinstance(self.behaviour, Damped)
             if self._observe() and self.plant.motors_obey and not is_limp:
-                acted = self._commands[max(-1 - self.latency.ticks, -len(self._commands))]
-                self._motors.update(acted, self.state, self.plant.control_period)
+                self._motors.update(self._acted, self.state, self.plant.control_period)
             self._look_after_parts()
             self._guard()
             self._feel()
             target = self.behaviour.update(self.snapshot)
             self._sag, self._lean = self._sag_and_lean(target)
+            self._watch_feet(target)
             self._foretold = False
             command = self._command(target)
             if not self._foretold:
@@ -193,7 +196,7 @@ class ControlLoop:
 
     def _look_after_parts(self) -> None:
         """Say what has broken; a robot that cannot stand without it goes limp before it falls."""
-        faults = (*self.plant.sensor_faults, *self._motors.faults)
+        faults = (*self.plant.sensor_faults, *self._motors.faults, *self._feet.faults)
         if len(faults) != len(self.health.faults):
             for fault in (fault for fault in faults if fault not in self.health.faults):
                 self.warn("%s", fault)
@@ -202,6 +205,19 @@ class ControlLoop:
             grave = [str(fault) for fault in faults if not fault.is_survived]
             if grave:
                 self.abandon(Fault("; ".join(grave), may_fall=True))
+
+    @property
+    def _acted(self) -> JointCommand:
+        """The command that has acted until now."""
+        return self._commands[max(-1 - self.latency.ticks, -len(self._commands))]
+
+    def _watch_feet(self, target: Reference | JointReference) -> None:
+        if not (isinstance(target, Reference) and self.plant.motors_obey):
+            return
+        if feet_astray(Target.of(target.row), self.snapshot, self._astray) > ASTRAY:
+            state = self.state
+            asked = self._acted.asked(state.joint_positions, state.joint_velocities)
+            self._feet.update(self._astray, asked, state, self.plant.control_period)
 
     def _payload_of(self, behaviour: Behaviour) -> Payload:
         """What ``behaviour`` is to know of what the robot carries."""

@@ -19,7 +19,7 @@ from go2_wbc.brief import brief
 from go2_wbc.compilation import kernel
 from go2_wbc.errors import CommandError
 from go2_wbc.lazy import moved_names
-from go2_wbc.records import Record
+from go2_wbc.records import Array4, Record
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.state import Snapshot
 
@@ -80,6 +80,29 @@ def sag_and_lean(target: Target, now: Snapshot) -> tuple[float, float]:
     for i in range(3):
         cosine += target.R_world_base[2, i] * now.R_world_base[2, i]
     return target.p_world[2] - measured, np.arccos(min(max(cosine, -1.0), 1.0))
+
+
+REACH, STILL = 0.2, 0.5
+"""Distance [m] of a foot from its joints, roughly; and speed [m/s] of one that stays."""
+
+
+@kernel
+def feet_astray(target: Target, now: Snapshot, astray: Array4) -> float:
+    """Fill how far each foot is that stays where it shall not, in the air [m]; 0 for the others.
+
+    Returns the greatest.
+    """
+    for leg in range(4):
+        square, speed = 0.0, 0.0
+        for i in range(3):
+            j = 3 * leg + i
+            if target.legs[leg] == SWING:
+                square += (target.p_world_feet[leg, i] - now.p_world_feet[leg, i]) ** 2
+            elif target.legs[leg] == JOINTS:
+                square += (REACH * (target.q_joints[j] - now.q[7 + j])) ** 2
+            speed += now.v_world_feet[leg, i] ** 2
+        astray[leg] = np.sqrt(square) if speed < STILL**2 else 0.0
+    return float(np.max(astray))
 
 
 _LEG_TASKS = tuple(LegTask)

@@ -9,6 +9,7 @@ anything is estimated of it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -26,6 +27,8 @@ from go2_wbc.robot.sensor_watch import SensorWatch
 from go2_wbc.robot.state import RobotState, SensorReading
 
 AXES = ("x", "y", "z")
+HELD_TIME = 0.3
+"""Time [s] for which a foot is held."""
 
 
 class FaultKind(StrEnum):
@@ -43,6 +46,8 @@ class FaultKind(StrEnum):
     """The gyro reads so much more about an axis, x unless said [0.5 rad/s]."""
     ACCELEROMETER = "accelerometer"
     """The accelerometer, the same [1 m/s^2]."""
+    FOOT_HELD = "foot_held"
+    """A foot is held where it is for ``HELD_TIME``, by so much force at the most [200 N]."""
     NOT_A_NUMBER = "not_a_number"
     """A joint's angle, a foot's force, or an axis of the gyro, is nan in one reading."""
     LOST_PACKETS = "lost_packets"
@@ -60,6 +65,7 @@ _PARTS: Mapping[FaultKind, Mapping[str, int]] = {
     FaultKind.FOOT_FORCE: _FEET,
     FaultKind.GYRO: _AXES,
     FaultKind.ACCELEROMETER: _AXES,
+    FaultKind.FOOT_HELD: _FEET,
     FaultKind.NOT_A_NUMBER: {**_JOINTS, **_FEET, **_AXES},
     FaultKind.LOST_PACKETS: _NOTHING,
 }
@@ -70,6 +76,7 @@ _VALUES: Mapping[FaultKind, float] = {
     FaultKind.FOOT_FORCE: 0.0,
     FaultKind.GYRO: 0.5,
     FaultKind.ACCELEROMETER: 1.0,
+    FaultKind.FOOT_HELD: 200.0,
     FaultKind.NOT_A_NUMBER: np.nan,
     FaultKind.LOST_PACKETS: 0.05,
 }
@@ -141,6 +148,12 @@ class Faults:
         for fault in broken:
             shares[fault.index] = fault.value
         return shares
+
+    def begun_holds(self, time: float, period: float) -> list[InjectedFault]:
+        """The feet that are held from the tick of ``time`` on, of a plant with this period."""
+        tick = round(time / period)
+        held = (fault for fault in self.known if fault.kind is FaultKind.FOOT_HELD)
+        return [fault for fault in held if math.ceil(fault.at / period - 1e-6) == tick]
 
     def loses(self, time: float, rng: np.random.Generator) -> bool:
         """Whether the state of ``time`` does not arrive."""

@@ -80,6 +80,7 @@ from go2_wbc.robot.state import OdometryCovariance, RobotState, SensorReading
 from go2_wbc.robot.state_filter import (
     ERROR,
     FEET,
+    FORCE_BIAS,
     GYRO_BIAS,
     THETA,
     VELOCITY,
@@ -95,14 +96,15 @@ from go2_wbc.robot.state_filter import (
     turn_world_about_robot,
 )
 
-IMU_FRAME = "imu"
 _START_DEVIATIONS = (0.001, 0.1, 0.01)
 """Of position [m], velocity [m/s] and feet [m] when the filter begins (own choice); the position is
 the origin by definition."""
 _THROWN_DEVIATIONS, _THROWN_TILT = (0.001, 2.0, 1.0), 1.0
 """The same of a robot that falls, or is thrown, and of its roll and pitch [rad]."""
-_DOUBTED_TILT, _DOUBTED_SPEED = 0.05, 0.2
-"""Deviations of roll and pitch [rad] and of the velocity [m/s] after the gyro has erred a while."""
+_AFTER_GYRO = ((THETA, 2, 0.05), (VELOCITY, 3, 0.2))
+_AFTER_FORCE = ((THETA, 2, 0.05), (VELOCITY, 3, 0.2), (FORCE_BIAS, 3, 0.2))
+"""Of what, and by which deviations, the filter is unsure once the gyro or the accelerometer has
+erred for a while: roll and pitch [rad], the velocity [m/s], the accelerometer's bias [m/s^2]."""
 _STEADY_HEADING = 1e-4
 """Deviation [rad] of the heading when the filter begins: it is 0 by definition."""
 
@@ -261,11 +263,7 @@ class StateEstimator:
     ) -> None:
         """Estimate the state of ``model``'s robot, and watch its sensors unless told not to."""
         self._config = config or EstimatorConfig()
-        pin_model = model.pin_model
-        self._p_base_imu = np.array(model.profile.imu_place)
-        if pin_model.existFrame(IMU_FRAME):
-            imu = pin_model.frames[pin_model.getFrameId(IMU_FRAME)]
-            self._p_base_imu = np.array(imu.placement.translation)
+        self._p_base_imu = model.p_base_imu
         self._geometry = [LegGeometry.of(model, leg) for leg in LEGS]
         sizes = self._p_base_imu, model.foot_radius, model.gravity
         self._numbers = packed(EstimatorNumbers(self._config, leg_table(model), *sizes))
@@ -306,7 +304,7 @@ class StateEstimator:
         """Take back a turn [rad] in the base frame that was none, and doubt tilt and velocity."""
         R = pin.Quaternion(self._x.quaternion).toRotationMatrix() @ pin.exp3(-turn)
         self._x.quaternion[:] = pin.Quaternion(R).coeffs()
-        for first, count, deviation in ((THETA, 2, _DOUBTED_TILT), (VELOCITY, 3, _DOUBTED_SPEED)):
+        for first, count, deviation in _AFTER_GYRO if turn.any() else _AFTER_FORCE:
             doubted = range(first, first + count)
             self._P[doubted, doubted] += deviation**2
 

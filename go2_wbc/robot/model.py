@@ -24,6 +24,7 @@ from go2_wbc.robot.rigid_body import RigidBodies, fill_snapshot
 from go2_wbc.robot.state import RobotState, Snapshot
 from go2_wbc.world import PAYLOAD_HALF_SIZE, World
 
+IMU_FRAME = "imu"
 LEG_AXES = ("JointModelRX", "JointModelRY", "JointModelRY")
 """What Pinocchio calls the joints of a leg: they turn about x, y and y."""
 FINGERPRINT_DECIMALS = 9
@@ -47,6 +48,7 @@ class RobotModel:
         torque_limits: (12,) [N m], the motors' peak.
         speed_limits: (12,) [rad/s].
         q_lower, q_upper: (12,) joint limits [rad], the tighter of URDF and published ones.
+        p_base_imu: (3,) place of the IMU in the base frame [m].
         p_base_hips: (4, 3) hip abduction axes' origins in the base frame [m].
         hip_width: lateral distance [m] from the abduction axis to the leg plane.
         p_base_feet_nominal: (4, 3) points of the leg planes beside the hips in the base frame [m];
@@ -102,6 +104,10 @@ class RobotModel:
         hip = self.profile.hip_limit
         self.q_lower[0::3] = np.maximum(self.q_lower[0::3], -hip)
         self.q_upper[0::3] = np.minimum(self.q_upper[0::3], hip)
+        self.p_base_imu = np.array(self.profile.imu_place)
+        if model.existFrame(IMU_FRAME):
+            imu = model.frames[model.getFrameId(IMU_FRAME)]
+            self.p_base_imu = np.array(imu.placement.translation)
         hips = [model.jointPlacements[model.getJointId(JOINT_NAMES[3 * leg])] for leg in LEGS]
         self.p_base_hips = np.array([T.translation for T in hips])
         thigh = model.jointPlacements[model.getJointId(JOINT_NAMES[1])]

@@ -1,10 +1,11 @@
 """Which motor is broken: what it was asked for against what it gave.
 
-Over the last fraction of a second, the share that a motor gives is the least squares' slope
+Over the last fraction of a second, the share that a motor gives is
 
-    share = sum (asked given) / sum asked^2
+    share^2 = sum given^2 / sum asked^2
 
-It is judged while enough is asked, and what is asked stays within what the motor can give.
+which a command that acts late does not lower. It is judged while enough is asked, and what is asked
+stays within what the motor can give.
 """
 
 from __future__ import annotations
@@ -19,23 +20,24 @@ from go2_wbc.robot.state import JointCommand, PartFault, RobotState
 
 SETTLING = 0.1
 """Time constant [s] of the sums."""
-ASKED = 3.0
+ASKED = 0.25
 """Root mean square [N m] of what is asked, from which on a motor is judged."""
-WEAK, DEAD = 0.6, 0.2
-"""Share below which it is broken, and below which it is dead."""
+WEAK, DEAD = 0.65, 0.42
+"""Share below which it is broken, and below which it is dead: of one that has just died so much is
+left in the sums when it is named, and half a torque is half a torque."""
 LASTS = 0.12
-"""For how long [s]; a command that acts late lowers the share, as a leg strikes the ground."""
+"""For how long [s]: of sound motors, in the worlds of the tables, 0.02 at most."""
 
 
 class WatchedMotors(Record):
     """What is remembered from tick to tick.
 
     Attributes:
-        both, asked: the sums of the slope [N^2 m^2].
+        given, asked: the sums [N^2 m^2].
         weak_time: for how long the share has been too low [s].
     """
 
-    both: Array12
+    given: Array12
     asked: Array12
     weak_time: Array12
 
@@ -63,9 +65,9 @@ def watch_motors(
         asked = tau[j] + kp[j] * (q_des[j] - q[7 + j]) + kd[j] * (v_des[j] - v[6 + j])
         least, most = torque_range(motor, j, float(v[6 + j]))
         asked = min(max(asked, least), most)
-        s.both[j] = keep * s.both[j] + (1.0 - keep) * asked * given[j]
+        s.given[j] = keep * s.given[j] + (1.0 - keep) * given[j] * given[j]
         s.asked[j] = keep * s.asked[j] + (1.0 - keep) * asked * asked
-        is_weak = s.asked[j] > ASKED * ASKED and s.both[j] < WEAK * s.asked[j]
+        is_weak = s.asked[j] > ASKED * ASKED and s.given[j] < WEAK * WEAK * s.asked[j]
         s.weak_time[j] = s.weak_time[j] + dt if is_weak else 0.0
         if s.weak_time[j] > LASTS and found < 0:
             found = j
@@ -97,7 +99,7 @@ class MotorWatch:
         if joint < 0:
             return
         name = JOINT_NAMES[joint]
-        share = float(self._state.both[joint] / self._state.asked[joint])
+        share = float(np.sqrt(self._state.given[joint] / self._state.asked[joint]))
         self._state.weak_time[joint] = 0.0
         if all(fault.part != f"motor of {name}" for fault in self.faults):
             is_dead = share < DEAD

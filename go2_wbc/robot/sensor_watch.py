@@ -6,13 +6,11 @@ named, and put right where they tell what it should have been. The residuals:
     encoder jumps    q - q_last - v dt                            the jump is taken off from then on
     encoder stuck    q and v stay while the leg's others turn     nothing replaces it
     foot's force     against f = -J^-T (tau - M dv/dt)            replaced by f
-    gyro             d/dt (p_i - p_j) + w x (p_i - p_j) = 0 of    the error is taken off
-                     feet that stand, least squares over time
+    IMU              against feet that stand: ``imu_watch``       the error is taken off
 
-with J and M of a leg alone, in the base frame, and p_i the point of a foot that touches: its centre
-rolls by w_calf x (r e_z). Forces are judged while the legs carry the robot, the gyro by what its
-error explains of the feet's residual: feet that slip do not turn together. A reading that is not a
-number is taken for the one before. A healthy robot's readings leave as they came, to the bit.
+with J and M of a leg alone, in the base frame. Forces are judged while the legs carry the robot. A
+reading that is not a number is taken for the one before. A healthy robot's readings leave as they
+came, to the bit.
 """
 
 from __future__ import annotations
@@ -26,10 +24,18 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
-from go2_wbc.algebra.linear import cross, plus_scaled, put, triple
+from go2_wbc.algebra.linear import cross, dot, plus_scaled, put, triple
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
-from go2_wbc.records import V3, Array3, Array3x3, Array4, Array12, Record, numbers_of, packed
+from go2_wbc.records import V3, Array3, Array4, Array4x3, Array12, Record, numbers_of, packed
+from go2_wbc.robot.imu_watch import (
+    THROWN,
+    WatchedImu,
+    judge_accelerometer,
+    judge_gyro,
+    note_bearing,
+    note_turn,
+)
 from go2_wbc.robot.leg_kinematics import LegGeometry, Legs, leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import PartFault, SensorReading
@@ -50,30 +56,20 @@ LOADED, FREE = 20.0, 10.0
 that swing in a trot 99 % seem to bear less than 7 N."""
 UNFELT, SENSED = 3.0, 25.0
 """Force [N] below which a sensor says that the foot is free, and above which it says it stands."""
-FORCE_TIME, SAME_TIME = 0.06, 0.25
+FORCE_TIME, SAME_TIME = 0.12, 0.25
 """Time [s] for which they contradict each other, and in which a living sensor changes."""
-SETTLING = 0.08
-"""Time constant [s] over which the gyro is judged."""
-GYRO_LIMIT, GYRO_LASTS = 0.22, 0.07
-"""Error of the gyro [rad/s] that is named, if it lasts so long [s]."""
-SETTLING_AND_LASTING = SETTLING + GYRO_LASTS
-"""How long [s] an error has been there when it is found, more or less."""
-EXPLAINED = 0.8
-"""Share of the feet's squared residual that an error of the gyro explains, if it is one. A foot
-that slides off an edge and the one that stands with it seem to turn, too: with 0.3 a gyro was named
-within 20 s in 6 of 7 walks over boxes of 8 cm, with this in none."""
-CARRIED, UPRIGHT = 0.7, 0.85
+NOISY, MOST_NOISE, NOISE_TIME = 1.5, 4.0, 0.5
+"""Mean of |f - 2 f_1 + f_2|, up to so much [N], over this time [s], above which a sensor has noise:
+its own is 2.6. Others say the same while the load stays: they are judged once that changes."""
+CHANGED = 15.0
+"""By so much [N]."""
+RUBBING = 2.0
+"""N m s/rad; joints damped so, as in MuJoCo Menagerie's Go2, may not be taken for loads."""
+CARRIED, UPRIGHT = 0.7, 0.9
 """Share of the robot's weight that its legs bear while it stands or walks, and the cosine of its
 greatest tilt then: legs of one that lies or tumbles strike what they do not stand on."""
-CALM = 0.05
-"""Time [s] after which one that has come to its feet is judged by them."""
 STANDING = np.tile([0.0, 0.8, -1.6], 4)
 """Joint angles [rad] of a robot that stands, roughly."""
-UNSEEN = 0.5
-"""m^2 that is added to what feet tell of each axis of the gyro's error, and draws it towards 0: two
-feet tell nothing of a turn about the line between them. A pair adds 0.1 to 0.25 in each tick."""
-FINER = 1.0 / 3.0
-"""Share of the gyro's limit above which what is left of its error is taken off, too."""
 
 
 class WatchedSensors(Record):
@@ -86,16 +82,14 @@ class WatchedSensors(Record):
         dv: smoothed accelerations of the joints [rad/s^2].
         same: for how long a joint has read the very same [s].
         travel: how far the other joints of its leg have turned since [rad].
-        force: the last of each foot [N], as it was read.
+        force, rise: the last of each foot [N], as it was read, and its last change.
+        noise: of it; see ``NOISY`` [N].
         force_same: for how long it has been the very same [s].
+        load: of the leg, when that began [N].
         against: for how long a foot's force has contradicted the leg's torques [s].
-        stood: for how long its legs have carried it [s].
-        turning, turned, residual: normal equations of the gyro's error, and the squared residual.
-        gyro_off, gyro_time: the error that is taken off [rad/s], for how long there has been one.
         gyro, accelerometer: the last, as they were read.
-        gyro_jump: the last error that was taken off [rad/s].
-        tilt_is_off: 1 in the moment in which the gyro's error is taken off.
-        stuck, force_is_wrong, gyro_is_off: 1 for what is broken.
+        imu: the IMU against feet that stand.
+        stuck, force_is_wrong, gyro_is_off, accelerometer_is_off: 1 for what is broken.
         jumped: 1 for an encoder whose shift is not 0.
     """
 
@@ -107,22 +101,19 @@ class WatchedSensors(Record):
     same: Array12
     travel: Array12
     force: Array4
+    rise: Array4
+    noise: Array4
     force_same: Array4
+    load: Array4
     against: Array4
-    stood: float
-    turning: Array3x3
-    turned: Array3
-    residual: float
-    gyro_off: Array3
-    gyro_time: float
     gyro: Array3
     accelerometer: Array3
-    gyro_jump: Array3
-    tilt_is_off: float
+    imu: WatchedImu
     stuck: Array12
     jumped: Array12
     force_is_wrong: Array4
     gyro_is_off: float
+    accelerometer_is_off: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,12 +125,16 @@ class WatchNumbers:
         foot_radius: [m].
         inertia: of each leg about its joints, standing [kg m^2].
         weight: of the robot [N].
+        gravity: [m/s^2].
+        p_base_imu: place of the IMU in the base frame [m].
     """
 
     legs: Legs
     foot_radius: float
     inertia: Float[np.ndarray, "4 3 3"]
     weight: float
+    gravity: float
+    p_base_imu: Array3
 
     @classmethod
     def of(cls, model: RobotModel) -> WatchNumbers:
@@ -150,9 +145,9 @@ class WatchNumbers:
         M = pin.crba(pin_model, pin_model.createData(), q)
         M = np.triu(M) + np.triu(M, 1).T
         blocks = [M[k : k + 3, k : k + 3] for k in range(6, 18, 3)]
-        return cls(
-            leg_table(model), model.foot_radius, np.array(blocks), model.mass * model.gravity
-        )
+        weight, imu = model.mass * model.gravity, model.p_base_imu
+        sizes = model.foot_radius, np.array(blocks), weight, model.gravity, imu
+        return cls(leg_table(model), *sizes)
 
 
 @subroutine
@@ -201,11 +196,12 @@ def watch_encoders(s: WatchedSensors, r: SensorReading, dt: float) -> None:
 
 
 @subroutine
-def leg_motion(leg: LegGeometry, q: V3, u: V3, tau: V3) -> tuple[V3, V3, V3]:
+def leg_motion(leg: LegGeometry, q: V3, u: V3, tau: V3) -> tuple[V3, V3, V3, float]:
     """Place [m] and velocity [m/s] of a foot from its base, and the force on it by the torques [N].
 
     ``tau`` without what moves the leg itself: f = -J^-T tau, with the columns c of J: J^-T =
-    [c1 x c2, c2 x c0, c0 x c1] / det J. All in the base frame.
+    [c1 x c2, c2 x c0, c0 x c1] / det J. The last is by how much joints that rub may belie its z
+    [N]: ``RUBBING`` |u| in the place of tau. All in the base frame.
     """
     c1, s1, c2, s2 = np.cos(q[0]), np.sin(q[0]), np.cos(q[1]), np.sin(q[1])
     c3, s3 = np.cos(q[1] + q[2]), np.sin(q[1] + q[2])
@@ -232,8 +228,14 @@ def leg_motion(leg: LegGeometry, q: V3, u: V3, tau: V3) -> tuple[V3, V3, V3]:
         scale * (tau[0] * a[1] + tau[1] * b[1] + tau[2] * c[1]),
         scale * (tau[0] * a[2] + tau[1] * b[2] + tau[2] * c[2]),
     )
+    rubbing = abs(u[0] * a[2]) + abs(u[1] * b[2]) + abs(u[2] * c[2])
     place = leg.p_base_hip
-    return (place[0] + x, place[1] + y, place[2] + z), velocity, force
+    return (
+        (place[0] + x, place[1] + y, place[2] + z),
+        velocity,
+        force,
+        RUBBING * abs(scale) * rubbing,
+    )
 
 
 @subroutine
@@ -245,126 +247,111 @@ def less_rolling(q: V3, u: V3, velocity: V3, w: V3, up: V3, radius: float) -> V3
 
 
 @subroutine
+def feels_the_same(s: WatchedSensors, force: float, leg: int, borne: float, dt: float) -> bool:
+    """Whether a foot's sensor says what it said before for longer than a living one does."""
+    rise = force - s.force[leg]
+    if rise == 0.0 and force > UNFELT:
+        s.force_same[leg] += dt
+    else:
+        s.force_same[leg], s.load[leg] = 0.0, borne
+    if rise != 0.0 and force > UNFELT:
+        share = 1.0 - np.exp(-dt / NOISE_TIME)
+        s.noise[leg] += share * (min(abs(rise - s.rise[leg]), MOST_NOISE) - s.noise[leg])
+    s.force[leg], s.rise[leg] = force, rise
+    is_odd = s.noise[leg] > NOISY or abs(borne - s.load[leg]) > CHANGED
+    return s.force_same[leg] > SAME_TIME and is_odd
+
+
+@subroutine
 def watch_force(
-    s: WatchedSensors, r: SensorReading, leg: int, borne: float, carries: bool, dt: float
+    s: WatchedSensors,
+    r: SensorReading,
+    leg: int,
+    borne: float,
+    slack: float,
+    carries: bool,
+    dt: float,
 ) -> None:
-    """Hold a foot's sensor against ``borne``, the force by the leg's torques [N]."""
+    """Hold a foot's sensor against what its leg bears, give or take ``slack`` [N]."""
     force = r.foot_forces[leg]
-    is_same = force == s.force[leg] and force > UNFELT and carries
-    s.force_same[leg] = s.force_same[leg] + dt if is_same else 0.0
-    is_against = (force < UNFELT and borne > LOADED) or (force > SENSED and borne < FREE)
+    is_same = feels_the_same(s, force, leg, borne, dt)
+    is_dead = force < UNFELT and borne - slack > LOADED
+    is_against = is_dead or (force > SENSED and borne + slack < FREE)
     s.against[leg] = s.against[leg] + dt if is_against and carries else 0.0
-    s.force[leg] = force
-    if s.against[leg] > FORCE_TIME or s.force_same[leg] > SAME_TIME:
+    if s.against[leg] > FORCE_TIME or (is_same and carries):
         s.force_is_wrong[leg] = 1.0
     if s.force_is_wrong[leg] > 0.0:
         r.foot_forces[leg] = borne if borne > LOADED else 0.0
 
 
 @subroutine
-def note_turn(s: WatchedSensors, between: V3, apart: V3, w: V3) -> None:
-    """Add what two feet that stand say of the gyro's error d: apart + (w - d) x between = 0.
-
-    With e = apart + w x between it is d x between = e, so that A d = b with
-    A = between^2 1 - between between' and b = between x e.
-    """
-    moved = cross(w, between)
-    e = (apart[0] + moved[0], apart[1] + moved[1], apart[2] + moved[2])
-    b = cross(between, e)
-    length = between[0] * between[0] + between[1] * between[1] + between[2] * between[2]
-    s.residual += e[0] * e[0] + e[1] * e[1] + e[2] * e[2]
-    for i in range(3):
-        s.turned[i] += b[i]
-        s.turning[i, i] += length
-        for k in range(3):
-            s.turning[i, k] -= between[i] * between[k]
-
-
-@subroutine
-def gyro_error(s: WatchedSensors) -> V3:
-    """The least squares' answer, drawn towards 0 where the feet tell nothing."""
-    A, b = s.turning, s.turned
-    c0 = (A[0, 0] + UNSEEN, A[1, 0], A[2, 0])
-    c1 = (A[0, 1], A[1, 1] + UNSEEN, A[2, 1])
-    c2 = (A[0, 2], A[1, 2], A[2, 2] + UNSEEN)
-    r0, r1, r2 = cross(c1, c2), cross(c2, c0), cross(c0, c1)
-    det = c0[0] * r0[0] + c0[1] * r0[1] + c0[2] * r0[2]
-    return (
-        (r0[0] * b[0] + r0[1] * b[1] + r0[2] * b[2]) / det,
-        (r1[0] * b[0] + r1[1] * b[1] + r1[2] * b[2]) / det,
-        (r2[0] * b[0] + r2[1] * b[1] + r2[2] * b[2]) / det,
-    )
-
-
-@subroutine
 def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt: float) -> None:
-    """Hold the feet's forces against the legs' torques, and the gyro against feet that stand."""
+    """Hold the feet's forces against the legs' torques, and the IMU against feet that stand."""
+    m = s.imu
     for i in range(3):
         s.gyro[i], s.accelerometer[i] = r.gyro[i], r.accelerometer[i]
-        r.gyro[i] -= s.gyro_off[i]
+        r.gyro[i] -= m.gyro_off[i]
+        r.accelerometer[i] -= m.force_off[i]
     w = triple(r.gyro)
-    places, speeds, borne = np.empty((4, 3)), np.empty((4, 3)), np.empty(4)
+    places, speeds = np.empty((4, 3)), np.empty((4, 3))
+    borne, slack, loads = np.empty(4), np.empty(4), np.empty(4)
     for leg in range(4):
         j = slice(3 * leg, 3 * leg + 3)
         q, v = triple(r.q_joints[j]), triple(r.v_joints[j])
         tau = triple(r.tau[j] - c.inertia[leg] @ s.dv[j])
-        place, u, force = leg_motion(c.legs.geometry[leg], q, v, tau)
-        borne[leg] = force[2]
+        place, u, force, slack[leg] = leg_motion(c.legs.geometry[leg], q, v, tau)
         put(place, places[leg])
         put(less_rolling(q, v, u, w, up, c.foot_radius), speeds[leg])
-    stands = borne.sum() > CARRIED * c.weight and up[2] > UPRIGHT
-    s.stood = s.stood + dt if stands else 0.0
-    if s.stood < CALM:
-        forget_turns(s, 0.0)
-    carries = s.stood > 0.0
+        borne[leg] = force[2]
+    moved = plus_scaled(triple(r.accelerometer), -c.gravity, up)
+    is_up = up[2] > UPRIGHT
+    is_borne = is_up and borne.sum() > CARRIED * c.weight
+    note_bearing(m, is_up and dot(moved, moved) < THROWN**2, is_borne, dt)
     for leg in range(4):
-        watch_force(s, r, leg, borne[leg], carries, dt)
-    forget_turns(s, np.exp(-dt / SETTLING))
-    for one in range(4):
-        for other in range(one):
-            if min(borne[one], borne[other]) > LOADED and are_sound(s, one, other):
-                between = plus_scaled(triple(places[one]), -1.0, triple(places[other]))
-                apart = plus_scaled(triple(speeds[one]), -1.0, triple(speeds[other]))
-                note_turn(s, between, apart, w)
-    judge_gyro(s, dt)
+        watch_force(s, r, leg, borne[leg], slack[leg], is_borne, dt)
+        stands = r.foot_forces[leg] > SENSED or borne[leg] - slack[leg] > LOADED
+        is_used = stands and borne[leg] > LOADED and m.unborne == 0.0 and is_sound(s, leg)
+        loads[leg] = borne[leg] if is_used else 0.0
+    watch_imu(s, r, c, places, speeds, loads, up, dt)
 
 
 @subroutine
-def are_sound(s: WatchedSensors, one: int, other: int) -> bool:
-    """Whether the encoders of two legs are alive."""
+def watch_imu(
+    s: WatchedSensors,
+    r: SensorReading,
+    c: WatchNumbers,
+    places: Array4x3,
+    speeds: Array4x3,
+    loads: Array4,
+    up: V3,
+    dt: float,
+) -> None:
+    """Let feet that stand judge the IMU: those with a load [N]; all in the base frame."""
+    m, w, v = s.imu, triple(r.gyro), (0.0, 0.0, 0.0)
+    m.is_found, m.turn[:] = 0.0, 0.0
+    for one in range(4):
+        if loads[one] > 0.0:
+            arm = plus_scaled(triple(places[one]), -1.0, triple(c.p_base_imu))
+            along = plus_scaled(cross(w, arm), 1.0, triple(speeds[one]))
+            v = plus_scaled(v, -loads[one] / loads.sum(), along)
+            for other in range(one):
+                if loads[other] > 0.0:
+                    between = plus_scaled(triple(places[one]), -1.0, triple(places[other]))
+                    apart = plus_scaled(triple(speeds[one]), -1.0, triple(speeds[other]))
+                    note_turn(m, between, apart, w)
+    judge_gyro(m, dt)
+    stands = bool(np.sum(loads > 0.0) > 1)  # one foot may roll or slip
+    judge_accelerometer(m, triple(r.accelerometer), w, v, up, c.gravity, stands, dt)
+    s.gyro_is_off, s.accelerometer_is_off = m.gyro_is_off, m.force_is_off
+
+
+@subroutine
+def is_sound(s: WatchedSensors, leg: int) -> bool:
+    """Whether the encoders of a leg are alive."""
     worst = 0.0
     for k in range(3):
-        worst = max(worst, s.same[3 * one + k], s.same[3 * other + k])
-        worst = max(worst, s.stuck[3 * one + k], s.stuck[3 * other + k])
+        worst = max(worst, s.same[3 * leg + k], s.stuck[3 * leg + k])
     return worst < DOUBT
-
-
-@subroutine
-def forget_turns(s: WatchedSensors, keep: float) -> None:
-    """Let what feet have said count less."""
-    s.residual *= keep
-    for i in range(3):
-        s.turned[i] *= keep
-        for k in range(3):
-            s.turning[i, k] *= keep
-
-
-@subroutine
-def judge_gyro(s: WatchedSensors, dt: float) -> None:
-    """Name it once its error has lasted, and take the error off."""
-    error = gyro_error(s)
-    explained = error[0] * s.turned[0] + error[1] * s.turned[1] + error[2] * s.turned[2]
-    limit = GYRO_LIMIT * FINER if s.gyro_is_off > 0.0 else GYRO_LIMIT
-    amount = np.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
-    is_off = amount > limit and explained > EXPLAINED * s.residual
-    s.gyro_time = s.gyro_time + dt if is_off else 0.0
-    s.tilt_is_off = 0.0
-    if s.gyro_time > GYRO_LASTS:
-        s.gyro_is_off, s.gyro_time, s.tilt_is_off = 1.0, 0.0, 1.0
-        for i in range(3):
-            s.gyro_off[i] += error[i]
-            s.gyro_jump[i] = error[i]
-        forget_turns(s, 0.0)
 
 
 @kernel
@@ -399,7 +386,7 @@ def watch_sensors(
             s.q[j], s.v[j] = r.q_joints[j], r.v_joints[j]
             r.q_joints[j] -= s.shift[j]
     watch_legs(s, r, c, up, dt)
-    broken = s.gyro_is_off
+    broken = s.gyro_is_off + s.accelerometer_is_off
     for j in range(12):
         broken += s.stuck[j] + s.jumped[j]
     for leg in range(4):
@@ -424,9 +411,9 @@ class SensorWatch:
 
     @property
     def misturned(self) -> Array3 | None:
-        """How far [rad] an error of the gyro, just found, has turned whoever believed it."""
-        s = self._state
-        return SETTLING_AND_LASTING * s.gyro_jump if s.tilt_is_off else None
+        """How far [rad] an error of the IMU, just found, has turned whoever believed it."""
+        m = self._state.imu
+        return m.turn.copy() if m.is_found else None
 
     def restart(self) -> None:
         """Forget everything: all parts are taken for sound."""
@@ -473,6 +460,7 @@ _PARTS = (
     *((name, "reads another angle than it turned to", True) for name in JOINT_NAMES),
     *((name, "feels another force than its leg bears", True) for name in FOOT_NAMES),
     ("gyro", "turns otherwise than the feet that stand", True),
+    ("accelerometer", "feels otherwise than the feet that stand move", True),
 )
 """What each flag of ``WatchedSensors`` says, in their order."""
 _FLAGS = slice(-len(_PARTS), None)

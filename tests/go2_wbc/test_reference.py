@@ -11,7 +11,17 @@ from hypothesis import strategies as st
 
 from go2_wbc.errors import CommandError
 from go2_wbc.motion_plan import MotionPlan
-from go2_wbc.reference import Anchor, LegTask, Reference, Target, TrackedPoint, sag_and_lean
+from go2_wbc.reference import (
+    REACH,
+    STILL,
+    Anchor,
+    LegTask,
+    Reference,
+    Target,
+    TrackedPoint,
+    feet_astray,
+    sag_and_lean,
+)
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from tests.compiled import assert_plain_is_compiled
@@ -129,3 +139,17 @@ def test_sag_is_measured_at_what_is_tracked_and_lean_between_the_verticals() -> 
         turned = reference.placed(Anchor(np.zeros(3), 1.0))
         assert sag_and_lean(Target.of(turned.row), snapshot)[1] == pytest.approx(lean, abs=1e-9)
         assert_plain_is_compiled(sag_and_lean, Target.of(reference.row), snapshot)
+
+
+def test_a_foot_is_astray_that_stays_where_it_shall_not_in_the_air() -> None:
+    for snapshot, reference in cases(MODEL, 50, seed=12):
+        astray, state = np.empty(4), snapshot.state
+        feet_astray(Target.of(reference.row), snapshot, astray)
+        lag = np.linalg.norm(reference.p_world_feet - snapshot.p_world_feet, axis=1)
+        turned = (reference.q_joints - state.joint_positions).reshape(4, 3)
+        stays = np.linalg.norm(snapshot.v_world_feet, axis=1) < STILL
+        by = {LegTask.STANCE: 0.0 * lag, LegTask.SWING: lag}
+        by[LegTask.JOINTS] = REACH * np.linalg.norm(turned, axis=1)
+        expected = [by[task][leg] * stays[leg] for leg, task in enumerate(reference.legs)]
+        assert astray == pytest.approx(expected, abs=EXACT)
+        assert_plain_is_compiled(feet_astray, Target.of(reference.row), snapshot, astray)

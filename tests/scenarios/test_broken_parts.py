@@ -14,7 +14,9 @@ SURVIVED = [
     ("encoder", "FL_calf_joint", None),
     ("foot_force", "RR_foot", None),
     ("foot_force", "FR_foot", 40.0),
-    ("gyro", "z", None),
+    ("gyro", "y", None),
+    ("accelerometer", "z", None),
+    ("foot_held", "FL_foot", None),
     ("motor", "FL_calf_joint", 0.5),
 ]
 GRAVE = [

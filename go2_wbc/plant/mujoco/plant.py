@@ -16,7 +16,7 @@ from jaxtyping import Float
 from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, unknown_name
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant
-from go2_wbc.plant.faults import Faults, InjectedFault
+from go2_wbc.plant.faults import HELD_TIME, Faults, InjectedFault
 from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN, bin_forces, read_joints
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
@@ -235,6 +235,8 @@ class MujocoPlant(Plant):
             self._acting = self._waiting.popleft()
         model, data = self._model, self._data
         total, shares = np.zeros(12), self._faults.torque_shares(self.time)
+        for hold in self._faults.begun_holds(self.time, self._period):
+            self._pushes.hold(hold.part, hold.value, HELD_TIME)
         for remaining in range(self._substeps, 0, -1):
             drive(self._acting, *self._motors, total)
             if shares is not None:
@@ -280,7 +282,7 @@ class MujocoPlant(Plant):
         Args:
             kind: one of ``go2_wbc.plant.faults.FaultKind``: ``"motor"``, ``"encoder"``,
                 ``"encoder_stuck"``, ``"foot_force"``, ``"gyro"``, ``"accelerometer"``,
-                ``"not_a_number"``, ``"lost_packets"``.
+                ``"foot_held"``, ``"not_a_number"``, ``"lost_packets"``.
             part: a joint (``"FL_calf_joint"``), a foot (``"FL_foot"``) or an axis (``"x"``).
             at: plant time [s]; now, unless said.
             value: what the part gives, or errs by; see ``FaultKind``.
@@ -289,7 +291,7 @@ class MujocoPlant(Plant):
             CommandError: for a kind or a part that does not exist, or a number that is none.
         """
         self._check_open()
-        fault = InjectedFault.of(kind, part, self.time if at is None else at, value)
+        fault = InjectedFault.of(kind, part, self.time if at is None else max(at, self.time), value)
         if self._senses is None and not self._faults.known:  # how it reads while it is sound
             self._faults.seen(self.read(), self.imu(), FOOT_CONTACT_THRESHOLD)
         self._faults.known += (fault,)

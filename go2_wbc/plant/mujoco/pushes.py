@@ -1,4 +1,9 @@
-"""External forces on the simulated robot that last for a while and overlay."""
+"""External forces on the simulated robot that last for a while and overlay.
+
+A held foot is a point on a spring and a damper, which give way to no more than a force:
+
+    f = k (p_held - p) - d v,  |f| <= f_most
+"""
 
 from __future__ import annotations
 
@@ -14,6 +19,9 @@ from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.plant.mujoco.layout import MujocoLayout
 from go2_wbc.robot.description import BASE_LINK
 
+STIFFNESS, DAMPING = 1e4, 50.0
+"""k [N/m] and d [N s/m] of a held foot: 2 cm at 200 N, and stable for a calf at steps of 2 ms."""
+
 
 @dataclass(frozen=True, slots=True)
 class Push:
@@ -22,14 +30,16 @@ class Push:
     Attributes:
         body: id of the body.
         p_body_point: where it acts, in the body's frame [m].
-        f_world: the force in the world [N].
+        f_world: the force in the world [N]; of what holds the point, its length is the greatest.
         steps_left: physics steps for which it still acts.
+        p_world_held: where the point is held [m]; None where the force is given.
     """
 
     body: int
     p_body_point: Float[np.ndarray, "3"]
     f_world: Float[np.ndarray, "3"]
     steps_left: int
+    p_world_held: Float[np.ndarray, "3"] | None = None
 
 
 @final
@@ -56,6 +66,13 @@ class Pushes:
         steps = max(1, round(duration / self._model.opt.timestep))
         self.active = (*self.active, Push(body, point, f_world, steps))
 
+    def hold(self, foot: str, most: float, duration: float) -> None:
+        """Holds a foot where it is from the next physics step on, by a force of at most [N]."""
+        self.add(np.array([0.0, 0.0, most]), duration, foot)
+        push = self.active[-1]
+        here = self._data.xipos[push.body] + self._arm(push)
+        self.active = (*self.active[:-1], replace(push, p_world_held=here))
+
     def apply(self) -> None:
         """Writes the forces for one physics step."""
         wrenches = self._wrenches
@@ -63,8 +80,11 @@ class Pushes:
         if not self.active:
             return
         for push in self.active:
-            wrenches[push.body, :3] += push.f_world
-            wrenches[push.body, 3:] += np.cross(self._arm(push), push.f_world)
+            arm = self._arm(push)
+            held = push.p_world_held
+            force = push.f_world if held is None else self._holding(push, held, arm)
+            wrenches[push.body, :3] += force
+            wrenches[push.body, 3:] += np.cross(arm, force)
         later = (replace(push, steps_left=push.steps_left - 1) for push in self.active)
         self.active = tuple(push for push in later if push.steps_left > 0)
 
@@ -73,6 +93,18 @@ class Pushes:
         R_world_body = self._data.xmat[push.body].reshape(3, 3)
         p_world_point = self._data.xpos[push.body] + R_world_body @ push.p_body_point
         return p_world_point - self._data.xipos[push.body]
+
+    def _holding(
+        self, push: Push, held: Float[np.ndarray, "3"], arm: Float[np.ndarray, "3"]
+    ) -> Float[np.ndarray, "3"]:
+        """The force of what holds a point [N]."""
+        data, twist = self._data, np.empty(6)  # angular before linear, at the centre of mass
+        body = mujoco.mjtObj.mjOBJ_BODY
+        mujoco.mj_objectVelocity(self._model, data, body, push.body, twist, 0)
+        velocity = twist[3:] + np.cross(twist[:3], arm)
+        force = STIFFNESS * (held - data.xipos[push.body] - arm) - DAMPING * velocity
+        most = float(np.linalg.norm(push.f_world))
+        return force * min(1.0, most / max(float(np.linalg.norm(force)), 1e-9))
 
     def _point(self, at: str) -> tuple[int, Float[np.ndarray, "3"]]:
         """Body and point that a name means."""

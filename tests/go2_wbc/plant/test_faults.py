@@ -37,6 +37,27 @@ def test_a_weak_motor_gives_its_share() -> None:
     assert weak.read().tau[10] == pytest.approx(0.5 * sound.read().tau[10], rel=0.1)
 
 
+def test_a_held_foot_stays_against_no_more_than_its_force() -> None:
+    raised = STAND.copy()
+    raised[1:3] += 0.3, -0.6
+    moved = []
+    for most in (0.0, 50.0, 200.0):
+        plant = MujocoPlant()
+        stand_up(plant)
+        plant.fault("foot_held", part="FL_foot", value=most, at=plant.time + 0.01)
+        saved, places = plant.save(), [plant.p_world_feet[0]]
+        for _ in range(100):
+            plant.write(JointCommand.servo(raised, np.zeros(12), 60.0, 2.0))
+            places.append(plant.p_world_feet[0])
+        moved.append(np.linalg.norm(places[-1] - places[0]))
+        plant.restore(saved)
+        for _ in range(100):
+            plant.write(JointCommand.servo(raised, np.zeros(12), 60.0, 2.0))
+        assert np.array_equal(plant.p_world_feet[0], places[-1])
+    assert moved[0] > moved[1] > moved[2]
+    assert moved[2] < 0.5 * moved[0]
+
+
 @pytest.mark.parametrize("sensors", ["ideal", "imu"])
 def test_the_watch_puts_right_what_a_sensor_reads_wrong(sensors: str) -> None:
     plant = MujocoPlant(sensors=sensors)

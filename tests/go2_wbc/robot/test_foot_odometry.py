@@ -14,7 +14,7 @@ import pinocchio as pin
 import pytest
 
 from go2_wbc.legs import LEGS, Leg
-from go2_wbc.robot.estimator import IMU_FRAME, EstimatorConfig, SensorReading, StateEstimator
+from go2_wbc.robot.estimator import EstimatorConfig, SensorReading, StateEstimator
 from go2_wbc.robot.foot_odometry import (
     LEAST_TRUST,
     Foot,
@@ -24,7 +24,7 @@ from go2_wbc.robot.foot_odometry import (
     see_ground,
 )
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
-from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.model import IMU_FRAME, RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 from go2_wbc.robot.state import RobotState
 from go2_wbc.robot.state_filter import FEET, Filter

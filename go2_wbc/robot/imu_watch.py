@@ -1,0 +1,221 @@
+"""The IMU held against feet that stand: does it err, and by how much?
+
+With p_i the point of a foot that touches, u_i its velocity relative to the base (``less_rolling``),
+and v that of the IMU by the feet that stand, weighted by what they bear, all in the base frame:
+
+    gyro            d/dt (p_i - p_j) + w x (p_i - p_j) = 0    least squares over time
+    accelerometer   d/dt s = a - w x s - R'g + (v - s) / T    (s - v) / T is its error
+
+Feet that slip do not turn together: an error of the gyro has to explain their residual, or to come
+with one of the accelerometer: feet seem to move otherwise, and soon gravity lies wrong. s is the
+velocity that the accelerometer integrates to, drawn to the feet's; between two steps nothing draws
+it. What has been wrong for a while is named and taken off, and so is what it has done to s.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from go2_wbc.algebra.linear import cross, dot, plus_scaled, put, triple
+from go2_wbc.compilation import subroutine
+from go2_wbc.records import V3, Array3, Array3x3, Record
+
+CALM, LONG_CALM = 0.3, 1.0
+"""Time [s] after which one that has come to its feet judges its gyro by them, and then its
+accelerometer: whoever believes the IMU has to know by then which way is up."""
+THROWN = 20.0
+"""Acceleration [m/s^2] of the trunk by which it is thrown: trots over boxes stay below 16 in 99.9 %
+of the time, pushes of 90 N s and falls are above 50."""
+BETWEEN_STEPS = 0.06
+"""Time [s] for which the legs of one that walks may not bear it: those of a trot do not for 0.03,
+and as long as a flight takes its landing is no reason to doubt anything."""
+SETTLING = 0.1
+"""Time constant [s] over which both are judged (T)."""
+GYRO_LIMIT, GYRO_LASTS = 0.22, 0.12
+"""Error of the gyro [rad/s] that is named, if it lasts so long [s]."""
+FOUND_AFTER, FOUND_SHARE = 0.2, 0.8
+"""How long [s] an error of the gyro has been there when it is found, more or less, and the share of
+it that the sums have taken in by then: 1 - exp(-0.16 / 0.1)."""
+REFINING = 0.2
+"""Time [s] over which what is left of it is measured then: both pairs of a trot's feet stand."""
+EXPLAINED = 0.3
+"""Share of the feet's squared residual that an error of the gyro explains, if it is one."""
+WITH_FORCE = 0.16
+"""Time [s] after which an error of the accelerometer speaks for one of the gyro, if it has one."""
+UNSEEN = 0.5
+"""m^2 that is added to what feet tell of each axis of the gyro's error, and draws it towards 0: two
+feet tell nothing of a turn about the line between them. A pair adds 0.1 to 0.25 in each tick."""
+FINER = 1.0 / 3.0
+"""Share of the accelerometer's limit above which what is left of an error counts, too."""
+FORCE_LIMIT, FORCE_LASTS, STAYING = 0.45, 0.25, 0.62
+"""Error of the accelerometer [m/s^2] that is named, if it lasts so long [s] without falling below
+this share of what it was: what a blow leaves fades."""
+
+TILTED, TILT_LASTS, TILT_SHARE = 2.0, 0.1, 0.7
+"""Once the gyro has erred, an error of the accelerometer is a tilt that it has left: taken back
+if it lasts so long [s], in the first two seconds from a finer limit on; and the share of it that is
+measured by then."""
+
+
+class WatchedImu(Record):
+    """What is remembered from reading to reading.
+
+    Attributes:
+        stood: for how long its legs have carried it [s].
+        unborne: for how long they have not [s].
+        turning, turned, residual: normal equations of the gyro's error, and the squared residual.
+        gyro_off, gyro_time: the error that is taken off [rad/s], for how long there has been one.
+        refining: for how long what is left is still measured [s].
+        since: time since an error of the gyro was taken off [s].
+        speed: of the IMU by the accelerometer, drawn to that by the feet [m/s].
+        excess, most_excess: error of the accelerometer, smoothed once more, and the greatest while
+            there is one [m/s^2].
+        force_off, force_time: the same as of the gyro, of the accelerometer [m/s^2].
+        turn: by which the gyro has turned whoever believed it until now [rad].
+        gyro_is_off, force_is_off: 1 for what is broken.
+        is_found: 1 in the moment in which an error is taken off.
+    """
+
+    stood: float
+    unborne: float
+    turning: Array3x3
+    turned: Array3
+    residual: float
+    gyro_off: Array3
+    gyro_time: float
+    refining: float
+    since: float
+    speed: Array3
+    excess: Array3
+    most_excess: float
+    force_off: Array3
+    force_time: float
+    turn: Array3
+    gyro_is_off: float
+    force_is_off: float
+    is_found: float
+
+
+@subroutine
+def note_bearing(m: WatchedImu, is_calm: bool, is_borne: bool, dt: float) -> None:
+    """Count how long its legs have carried it; the gaps between steps do not count."""
+    m.unborne = 0.0 if is_borne else m.unborne + dt
+    if not is_calm or m.unborne > BETWEEN_STEPS:
+        m.stood = 0.0
+    elif is_borne:
+        m.stood += dt
+    keep = 1.0 if m.refining > 0.0 else np.exp(-dt / SETTLING)
+    forget_turns(m, keep if m.stood >= CALM else 0.0)
+
+
+@subroutine
+def note_turn(m: WatchedImu, between: V3, apart: V3, w: V3) -> None:
+    """Add what two feet that stand say of the gyro's error d: apart + (w - d) x between = 0.
+
+    With e = apart + w x between it is d x between = e, so that A d = b with
+    A = between^2 1 - between between' and b = between x e.
+    """
+    moved = cross(w, between)
+    e = (apart[0] + moved[0], apart[1] + moved[1], apart[2] + moved[2])
+    b = cross(between, e)
+    length = between[0] * between[0] + between[1] * between[1] + between[2] * between[2]
+    m.residual += e[0] * e[0] + e[1] * e[1] + e[2] * e[2]
+    for i in range(3):
+        m.turned[i] += b[i]
+        m.turning[i, i] += length
+        for k in range(3):
+            m.turning[i, k] -= between[i] * between[k]
+
+
+@subroutine
+def forget_turns(m: WatchedImu, keep: float) -> None:
+    """Let what feet have said count less."""
+    m.residual *= keep
+    for i in range(3):
+        m.turned[i] *= keep
+        for k in range(3):
+            m.turning[i, k] *= keep
+
+
+@subroutine
+def gyro_error(m: WatchedImu) -> V3:
+    """The least squares' answer, drawn towards 0 where the feet tell nothing."""
+    A, b = m.turning, m.turned
+    c0 = (A[0, 0] + UNSEEN, A[1, 0], A[2, 0])
+    c1 = (A[0, 1], A[1, 1] + UNSEEN, A[2, 1])
+    c2 = (A[0, 2], A[1, 2], A[2, 2] + UNSEEN)
+    r0, r1, r2 = cross(c1, c2), cross(c2, c0), cross(c0, c1)
+    det = c0[0] * r0[0] + c0[1] * r0[1] + c0[2] * r0[2]
+    return (
+        (r0[0] * b[0] + r0[1] * b[1] + r0[2] * b[2]) / det,
+        (r1[0] * b[0] + r1[1] * b[1] + r1[2] * b[2]) / det,
+        (r2[0] * b[0] + r2[1] * b[1] + r2[2] * b[2]) / det,
+    )
+
+
+@subroutine
+def judge_gyro(m: WatchedImu, dt: float) -> None:
+    """Name it once its error has lasted, and take the error off; and once more what is left."""
+    error = gyro_error(m)
+    if m.refining > 0.0:
+        m.refining -= dt
+        if m.refining <= 0.0:
+            take_off(m, error, FOUND_AFTER + REFINING)
+        return
+    explained = error[0] * m.turned[0] + error[1] * m.turned[1] + error[2] * m.turned[2]
+    is_large = dot(error, error) > GYRO_LIMIT**2
+    is_off = is_large and explained > EXPLAINED * m.residual
+    m.gyro_time = m.gyro_time + dt if is_off else 0.0
+    if m.gyro_time > GYRO_LASTS or (is_large and m.force_time > WITH_FORCE):
+        m.gyro_is_off, m.refining = 1.0, REFINING
+        share = 1.0 / FOUND_SHARE
+        take_off(m, (share * error[0], share * error[1], share * error[2]), FOUND_AFTER)
+
+
+@subroutine
+def take_off(m: WatchedImu, error: V3, time: float) -> None:
+    """Take an error of the gyro off that has been there for so long [s]."""
+    m.gyro_time, m.is_found, m.stood, m.since = 0.0, 1.0, CALM, 0.0
+    for i in range(3):
+        m.gyro_off[i] += error[i]
+        m.turn[i] = time * error[i]
+    forget_turns(m, 0.0)
+
+
+@subroutine
+def judge_accelerometer(
+    m: WatchedImu, force: V3, w: V3, v: V3, up: V3, gravity: float, stands: bool, dt: float
+) -> None:
+    """Name it once its error has lasted, and take the error off.
+
+    ``force``: what it reads, less what is taken off; ``v``: of the IMU by the feet, if they stand.
+    """
+    s, turning, share = m.speed, cross(w, triple(m.speed)), dt / SETTLING
+    for k in range(3):
+        s[k] += dt * (force[k] - turning[k] - gravity * up[k])
+        if stands:
+            m.excess[k] += share * ((s[k] - v[k]) / SETTLING - m.excess[k])
+            s[k] += share * (v[k] - s[k])
+    m.since += dt
+    is_tilt = m.gyro_is_off > 0.0
+    if m.stood < (CALM if is_tilt else LONG_CALM) or m.is_found > 0.0:
+        put(v, s)
+        m.excess[:] = 0.0
+    is_fine = m.since < TILTED if is_tilt else m.force_is_off > 0.0
+    amount = np.sqrt(dot(triple(m.excess), triple(m.excess)))
+    if amount < max(FORCE_LIMIT * (FINER if is_fine else 1.0), STAYING * m.most_excess):
+        m.force_time = m.most_excess = 0.0
+    elif stands:
+        m.force_time += dt
+        m.most_excess = max(m.most_excess, amount)
+    if m.force_time > (TILT_LASTS if is_tilt else FORCE_LASTS) and m.gyro_time == 0.0:
+        m.force_time, m.is_found = 0.0, 1.0
+        if is_tilt:
+            by = cross(up, triple(m.excess))
+            put(plus_scaled((0.0, 0.0, 0.0), 1.0 / (TILT_SHARE * gravity), by), m.turn)
+        else:
+            m.force_is_off = 1.0
+            for k in range(3):
+                m.force_off[k] += m.excess[k]
+        put(v, s)
+        m.excess[:] = 0.0
