@@ -8,7 +8,8 @@ Numbers were chosen on seeds 0 to 99; those that are judged begin at ``FIRST_SEE
   then a high five, a turn and sitting down. What a call that follows a failed one says counts, too.
 - combined: a trial walks at both speeds, with and without a load, stops and stands, and must not
   fall. Each row is one delay of the commands and one friction.
-- curve: (0.8, 0.3) m/s, 1.0 rad/s over boxes of 8 cm for 20 s.
+- curve: (0.8, 0.3) m/s, 1.0 rad/s over boxes of 8 cm for 20 s; where it is rough the robot goes
+  more slowly.
 - long: ten minutes of circles, and 200 high fives; what the process holds more in the end than when
   the recording was full.
 """

@@ -17,7 +17,10 @@ On sensors also (tuned on seeds 0 to 9 and 7000 to 7035, at 0.5 to 3 m/s), in a 
 where the robot lies:
 
 - creep: way of the estimate of a standing robot over 60 s, beyond the way in truth;
-- drift: the way walked by the estimate against that in truth, over 20 s.
+- drift: the way walked by the estimate against that in truth, over 20 s;
+- height, heading and velocity of the estimate while it walks up stairs, on a slope, and by commands
+  that change every ``EACH`` seconds: how far the first two are off in the end, and the velocity in
+  the mean of the worst second (tuned on seeds 101 to 106).
 
 ``benchmarks.unknown_world`` has the groups ``unknown``, ``unknown-sensors`` and ``robots``.
 """
@@ -33,7 +36,7 @@ from jaxtyping import Float
 
 from benchmarks import library
 from benchmarks.command import Benchmark
-from benchmarks.robots import UNTOLD, plant_of
+from benchmarks.robots import FRICTION_RANGE, UNTOLD, plant_of
 from benchmarks.study import IMU, Study, TrialResult
 from benchmarks.unknown_world import STUDIES as UNKNOWN
 from controller.motion_measurement import FULL
@@ -44,8 +47,9 @@ from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.envelopes import trot_of
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
+from go2_wbc.plant.terrain import Slope, Stairs, Terrain
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import yaw_rotation
+from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 
 FIRST_SEED = 14000
 """Seed of the first trial that is judged; those from 4000 on were, and causes found on them."""
@@ -176,6 +180,10 @@ ON_SENSORS = (
 # --- what the estimate makes of it ----------------------------------------------------------------
 
 ODOMETRY_SPEED = 0.5  # m/s
+EACH = 3.0  # s
+SLOPE = math.radians(15.0)
+MIXED = (-0.8, -0.5, -1.5), (1.5, 0.5, 1.5)
+"""Range of what is commanded: ahead, to the left [m/s], turning [rad/s]."""
 CALLS = ("stand", "high_five", "sit", "stand_again", "stop", "lie_down")
 
 
@@ -204,6 +212,45 @@ def measure_drift(trial: Trial, found: TrialResult, seconds: int, *, walks: bool
         found.values = {"drift": 100.0 * off / way, "turned": turned}
     else:
         found.values = {"creep": 1000.0 * off, "moved": 1000.0 * way}
+
+
+def measure_estimate(trial: Trial, found: TrialResult, terrain: Terrain | None, what: str) -> None:
+    """Walk on ``terrain``: ``"up"``, to all sides of a ``"slope"``, or ``"mixed"`` for a minute."""
+    rng = np.random.default_rng(FIRST_SEED + trial.seed)
+    friction, mass = rng.uniform(*FRICTION_RANGE), rng.uniform(*UNTOLD)
+    commands = {"up": [(0.5, 0.0, 0.0)] * 3, "mixed": rng.uniform(*MIXED, size=(20, 3)).tolist()}
+    commands["slope"] = [(0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, -0.3, 0.0)]
+    plant = MujocoPlant(
+        terrain=terrain,
+        friction=friction,
+        mass_scale=mass,
+        sensors=trial.sensors,
+        seed=FIRST_SEED + trial.seed,
+    )
+    off: list[Float[np.ndarray, "3"]] = []
+    with TrialRobot(plant) as robot:
+        robot.require(robot.go2.stand())
+        robot.require(robot.go2.walk())
+        before = _pose_off(plant)
+        robot.truth.on_tick = lambda: off.append(plant.read().v[:3] - plant.truth().v[:3])
+        for ahead, left, turn in commands[what]:
+            robot.go2.move(ahead, turn, linear_y=left)
+            robot.wait(EACH)
+            robot.truth.clear()
+        height, heading = _pose_off(plant) - before
+    second = round(1.0 / plant.control_period)
+    seconds = np.array(off[: len(off) // second * second]).reshape(-1, second, 3).mean(axis=1)
+    found.values = {
+        "height": 1000.0 * abs(float(height)),
+        "turned": math.degrees(abs(wrap_angle(float(heading)))),
+        "velocity": float(np.linalg.norm(seconds, axis=1).max()),
+    }
+
+
+def _pose_off(plant: MujocoPlant) -> Float[np.ndarray, "2"]:
+    """Height [m] and heading [rad] of the estimate less those in truth."""
+    seen, true = plant.read(), plant.truth()
+    return np.array([seen.q[2] - true.q[2], seen.yaw - true.yaw])
 
 
 def measure_calls(trial: Trial, found: TrialResult) -> None:
@@ -237,12 +284,33 @@ _DRIFT = (
     ("drift", "drift of odometry / way", "<= 1.5 %"),
     ("turned", "drift of the heading", "deg"),
 )
+_OFF = (
+    ("height", "height off", "mm"),
+    ("turned", "heading off", "deg"),
+    ("velocity", "velocity off, worst second", "m/s"),
+)
+
+
+def _barred(which: str, most: float) -> tuple[tuple[str, str, str], ...]:
+    """The rows of an estimate, one with a bar."""
+    return tuple(
+        (name, quantity, f"<= {most:g} {unit}" if name == which else unit)
+        for name, quantity, unit in _OFF
+    )
+
+
+_ON_STAIRS = partial(measure_estimate, terrain=Stairs(), what="up")
+_ON_SLOPE = partial(measure_estimate, terrain=Slope(SLOPE), what="slope")
+_MIXED = partial(measure_estimate, terrain=None, what="mixed")
 _DONE = tuple((call, f"{call} done", ">= 1") for call in CALLS)
 ESTIMATED = tuple(
     Study(name, {f"sensors: {item}": rows}, measure, prefix, group="sensors", sensors=IMU)
     for name, item, rows, measure, prefix in (
         ("standing", "standing, 60 s", _CREEP, _stand, ""),
         ("odometry", "trot 0.5 m/s, 20 s", _DRIFT, _walk, ""),
+        ("stairs", "up 4 stairs of 8 cm, 9 s", _barred("height", 15), _ON_STAIRS, "stairs"),
+        ("mixed", "20 commands, 60 s", _barred("turned", 1.5), _MIXED, "mixed"),
+        ("slope", "to all sides on 15 deg, 12 s", _barred("velocity", 0.03), _ON_SLOPE, "slope"),
         ("calls", "calls", _DONE, measure_calls, "done"),
     )
 )

@@ -226,7 +226,7 @@ class Judge:
         go2, truth, watch = self._robot.go2, self._robot.truth, self._watch
         truth.clear()
         watch.call, before = str(call), go2.mode
-        self._is_limp = call.name == "damp" or (self._is_limp and call.name not in POSTURES)
+        self._is_limp = call.name == "damp" or (self._is_limp and not before.is_upright)
         watch.may_lie = self._is_limp or call.name == "lie_down"
         self._second = second = _Second(self._robot, call.other, truth.start + call.moment)
         self._goal_row, raised = -1, None

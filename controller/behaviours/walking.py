@@ -91,7 +91,12 @@ class Walking(Behaviour):
 
     @property
     def follows_command(self) -> bool:
-        """Whether the planner has ramped the command; the robot itself may yet catch up."""
+        """Whether the planner has ramped the command, as far as the ground lets it.
+
+        The robot itself may yet catch up.
+        """
+        if self._planner.is_slowed:
+            return True
         command = self.command.linear_x, self.command.linear_y, self.command.angular_z
         return bool(np.allclose(self._planner.velocity, command, atol=SETTLED_COMMAND))
 

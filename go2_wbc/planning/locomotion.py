@@ -25,6 +25,7 @@ from go2_wbc.planning.gait_clock import adapt, foot_phase, restart
 from go2_wbc.planning.ground import (
     LEAST_FRICTION,
     MOST_FRICTION,
+    ROUGH_SPEED,
     Slip,
     carry_ground,
     ground_at,
@@ -33,6 +34,7 @@ from go2_wbc.planning.ground import (
     level_friction,
     note_stumble,
     observe_slip,
+    slow_down,
 )
 from go2_wbc.planning.rest import (
     come_to_rest,
@@ -124,7 +126,7 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
         follow_position(trunk, now, config.position_leash, dt)
     else:
         rest_in_place(now, s, config.position_leash, dt)
-    carry_ground(s.ground, now)
+    carry_ground(s.ground, now, dt)
     correct_height(trunk, now, s.ground.height + c.height, dt)
 
 
@@ -209,6 +211,7 @@ def plan(
     """
     dt = time - s.time
     s.time = time
+    slow_down(s.ground, command.velocity)
     advance_phase(now, s, c, command, dt)
     integrate(now, s, c, command, dt)
     if s.is_stepping:
@@ -281,6 +284,12 @@ class LocomotionPlanner:
     def velocity(self) -> Float[np.ndarray, "3"]:
         """Ramped command in the heading frame [m/s, m/s, rad/s]; 0 before ``start``."""
         return self._state.trunk.velocity.copy()
+
+    @property
+    def is_slowed(self) -> bool:
+        """Whether rough ground keeps the robot slower than it is told."""
+        x, y = self._state.trunk.velocity[:2].tolist()
+        return bool(self._state.ground.rough_time > 0.0 and np.hypot(x, y) > ROUGH_SPEED - TIE)
 
     @property
     def is_stepping(self) -> bool:

@@ -60,6 +60,9 @@ class EstimatorConfig:
         vertical: speed at which a standing foot is pressed flat and springs back [m/s].
         vertical_share: the same, by which it grows with the trunk's speed [m/s per m/s]: at speed
             a pitch is as good a reason for what feet spring back.
+        landing: what is added to ``vertical`` at touchdown [m/s]: a foot that comes down hard sinks
+            in and springs back, and pulled the height down by 1 cm at each step of stairs.
+        landing_time: in which that decays by 1 / e [s].
         compliance: by which a foot's sphere is pressed flat [m/N]; it rolls on its middle.
         longest_step: time [s] between two readings after which the filter begins anew.
     """
@@ -98,6 +101,8 @@ class EstimatorConfig:
     touchdown_time: float = 0.009
     vertical: float = 0.5
     vertical_share: float = 0.1
+    landing: float = 20.0
+    landing_time: float = 0.05
     compliance: float = 5e-5
     longest_step: float = 0.1
 

@@ -170,6 +170,7 @@ def follow_foot(
     """
     age = foot.age if force > c.contact_force else -dt
     slip = c.touchdown_slip * np.exp(-max(age, 0.0) / c.touchdown_time)
+    vertical += c.landing * np.exp(-max(age, 0.0) / c.landing_time)
     share = (force - c.contact_force) / (c.trusted_force - c.contact_force)
     trust = min(max(share, LEAST_TRUST), 1.0)
     foot.age = age + dt

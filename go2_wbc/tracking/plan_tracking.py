@@ -3,9 +3,9 @@
 The plan's reference is placed in the world; feet that step land when they meet the ground
 (``landing``); how far the robot is off it is noted; and the trunk's target is corrected for what
 stays of the error, integrated (see ``planning.trunk``), except in flight, where nothing can be
-corrected, and over two feet and just after: none of their forces acts across them, so place or
-attitude is off until the next foot lands, and the integral of that only shakes the robot. Trots
-whose trunk rolled by 26 deg went 0.4 m aside by it, and fell.
+corrected, and over two feet: none of their forces acts across them, so place or attitude is off
+until the next foot lands, and the integral of that only shakes the robot. Trots whose trunk rolled
+by 26 deg went 0.4 m aside by it, and fell.
 
 A payload is felt only after a while, and until then the correction holds it. Once it is known, what
 is done against it is taken out of the correction; the integral alone would do that in half a
@@ -38,9 +38,8 @@ from go2_wbc.robot.state import Snapshot
 from go2_wbc.tracking.landing import Landing, Landings, land
 from go2_wbc.tracking.plan_curves import StanceLoad
 
-PAIR, HELD = 2, 0.1
-"""Feet that hold a trunk along the line between them, and not across it, and time [s] on more of
-them from which on errors are integrated: a trot has 40 to 62 ms between its pairs."""
+PAIR = 2
+"""Feet that hold a trunk along the line between them, and not across it."""
 HEIGHT_PER_WEIGHT = 0.00055
 """Correction [m/N] that a payload's weight takes; this and the next two as found with 2 to 6 kg, up
 to 15 cm beside the middle."""
@@ -88,7 +87,6 @@ class Tracking(Record):
         ticks, raised_ticks: how many there have been, and of those with a raised leg.
         sag: depth [m] of the tracked point below the plan, now.
         lean: angle [rad] between the measured vertical of the trunk and the plan's, now.
-        held: time [s] since fewer than three feet stood.
     """
 
     landing: Landing
@@ -100,7 +98,6 @@ class Tracking(Record):
     raised_ticks: float
     sag: float
     lean: float
-    held: float
 
 
 class PlanTracker:
@@ -108,7 +105,7 @@ class PlanTracker:
 
     def __init__(self, anchor: Anchor, footsteps: Footsteps | None = None) -> None:
         """Follow a plan at ``anchor``, without correction at first."""
-        self._state = Tracking(landing=Landing.at(anchor), held=HELD)
+        self._state = Tracking(landing=Landing.at(anchor))
         self._events, self._changes, self._load = np.zeros(0), np.zeros((0, 4, 3)), _NO_LOAD
         if footsteps is not None:
             contacts, steps = footsteps.contacts, footsteps
@@ -181,8 +178,8 @@ def follow(
     error = np.empty(6)
     compare(now, target, error)
     note(now, error, s, target)
-    s.held = s.held + dt if standing_feet(target) > PAIR else 0.0
-    correct(now, error, dt if s.held >= HELD else 0.0, s.correction, target)
+    is_held = standing_feet(target) > PAIR
+    correct(now, error, dt if is_held else 0.0, s.correction, target)
 
 
 @subroutine

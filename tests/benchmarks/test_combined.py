@@ -4,10 +4,20 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks import combined
-from benchmarks.combined import CALLS, RESTING, STUDIES, measure_combined, measure_rest
-from benchmarks.study import TrialResult
+from benchmarks import combined, locomotion
+from benchmarks.combined import (
+    CALLS,
+    RESTING,
+    STUDIES,
+    measure_combined,
+    measure_curve,
+    measure_rest,
+)
+from benchmarks.study import IDEAL, IMU, TrialResult
 from controller.sweeps.trials import Trial
+
+HEIGHT_BAR, VELOCITY_BAR = 50.0, 0.03
+"""mm, of which it was 60 to 90 off; m/s."""
 
 
 @pytest.fixture
@@ -38,6 +48,27 @@ def test_a_walk_on_ice_is_not_done(friction: float, share: float) -> None:
     measure_combined(Trial(0), found, 0.0, friction)
     assert found.values == {"done": share}
     assert len(found.notes) == 1.0 - share
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("sensors", "seed"), [(IDEAL, 19), (IMU, 3)])
+def test_a_curve_over_boxes_is_walked(
+    sensors: str, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It fell: too fast, and by a gyro that was named as feet slid off boxes."""
+    monkeypatch.setattr(combined, "FIRST_SEED", 0)
+    monkeypatch.setattr(combined, "CURVE_TIME", 12.0)
+    measure_curve(Trial(seed, sensors=sensors), TrialResult())
+
+
+@pytest.mark.slow
+def test_the_height_is_known_after_stairs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(locomotion, "FIRST_SEED", 0)
+    found = TrialResult()
+    stairs = next(study for study in locomotion.ESTIMATED if study.name == "stairs")
+    stairs.measure(Trial(2, sensors=IMU), found)
+    assert found.values["height"] < HEIGHT_BAR
+    assert found.values["velocity"] < VELOCITY_BAR
 
 
 def test_a_long_run_tells_what_was_done_and_held(monkeypatch: pytest.MonkeyPatch) -> None:

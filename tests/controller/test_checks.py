@@ -58,6 +58,12 @@ def test_a_posture_is_known_whatever_the_height_of_the_ground(
     assert posture_measurements(snapshot) == pytest.approx(level, abs=1e-9)
 
 
+def test_the_speed_that_is_told_is_how_fast_the_base_moves_not_how_it_turns() -> None:
+    state = replace(at_rest(Posture.STAND).state, v=np.array([0.3, 0.0, 0.4, *np.ones(15)]))
+    told = posture_measurements(MODEL.snapshot(state))
+    assert told["base speed [m/s]"] == pytest.approx(0.5)
+
+
 @pytest.mark.parametrize("slope", [-0.14, 0.14])
 @pytest.mark.parametrize("posture", [Posture.STAND, Posture.SIT])
 def test_on_a_slope_a_posture_has_its_height_over_the_ground_below_it(

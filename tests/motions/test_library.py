@@ -115,12 +115,19 @@ def test_the_paw_is_held_for_the_time_asked_for(model: RobotModel, hold: float) 
     assert (plan.entry, plan.exit) == (Posture.STAND, Posture.STAND)
 
 
+def test_the_ends_of_a_range_are_within_it() -> None:
+    for parameter in find_motion("high_five").parameters:
+        if not isinstance(parameter.valid, Choice):
+            assert parameter.check(parameter.valid.low) == parameter.valid.low
+            assert parameter.check(parameter.valid.high) == parameter.valid.high
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"height": 0.9}, "height must be 0.45 to 0.66 m, got 0.9"),
+        ({"height": 0.9}, "height must be 0.25 to 0.66 m, got 0.9"),
         ({"side": "top"}, "unknown side 'top'; valid: left, right"),
-        ({"speed": 1.0}, "high_five: unknown parameter 'speed'; valid: height, hold, side"),
+        ({"speed": 1.0}, "high_five: unknown parameter 'speed'; valid: height, hold, reach, side"),
         ({"hold": float("nan")}, "hold must be 0.5 to 30 s, got nan"),
     ],
 )

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import ast
 import json
-import tomllib
 from pathlib import Path
 
 import pytest
 
 from tests.mutation.__main__ import (
     ALIVE,
-    EQUIVALENT,
     LIMITS,
     NEAR,
     PLAIN,
@@ -78,13 +76,6 @@ def test_a_planted_survivor_is_told_and_a_kill_and_what_never_ends(
 def test_annotations_errors_and_log_lines_are_left_alone() -> None:
     names = {mutant.name.partition(": ")[2] for mutant in mutants_of(QUIET.encode(), "a.py")}
     assert names == {"2 -> (3)", "not n -> (n)", 'return f"{n + 1}" -> return None'}
-
-
-def test_what_counts_as_equivalent_is_a_mutant_of_the_code_as_it_is() -> None:
-    named = {entry["mutant"] for entry in tomllib.loads(EQUIVALENT.read_text())["equivalent"]}
-    paths = {name.partition(" ")[0] for name in named}
-    found = [mutant for path in paths for mutant in mutants_of((ROOT / path).read_bytes(), path)]
-    assert named <= {mutant.name for mutant in found}
 
 
 def test_every_mutant_is_python_and_none_is_drawn_twice() -> None:

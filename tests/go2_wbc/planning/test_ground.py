@@ -15,6 +15,9 @@ from go2_wbc.planning.ground import (
     MOST_FRICTION,
     MOST_RAISE,
     MOST_SLOPE,
+    ROUGH,
+    ROUGH_SPEED,
+    ROUGH_TIME,
     SLIP_SPEED,
     SMOOTH,
     STUMBLE,
@@ -31,6 +34,7 @@ from go2_wbc.planning.ground import (
     level_friction,
     note_stumble,
     observe_slip,
+    slow_down,
 )
 from go2_wbc.robot.state import Snapshot
 from tests import engine_helpers as helpers
@@ -82,8 +86,27 @@ def test_it_is_carried_along_with_the_robot() -> None:
     snapshot = on_plane(SLOPE)
     ground = plane(snapshot)
     moved = snapshot.replaced(p_world_com=snapshot.p_world_com + [0.5, 0.2, 0.0])
-    carry_ground(ground, moved)
+    carry_ground(ground, moved, TICK)
     assert ground.height == pytest.approx(0.4 + SLOPE @ [0.5, 0.2], abs=EXACT)
+
+
+def test_the_robot_goes_slowly_on_rough_ground_and_for_a_while_after_it() -> None:
+    snapshot, asked = on_plane(SLOPE), np.array([1.2, -0.9, 2.0])
+    ground = plane(snapshot)
+
+    def told() -> np.ndarray:
+        velocity = asked.copy()
+        carry_ground(ground, snapshot, 0.5 * ROUGH_TIME)
+        slow_down(ground, velocity)
+        return velocity
+
+    np.testing.assert_array_equal(told(), asked)
+    ground.roughness = 1.01 * ROUGH
+    slowly = asked * ROUGH_SPEED / 1.5
+    np.testing.assert_allclose(told(), slowly)
+    ground.roughness = 0.99 * ROUGH
+    np.testing.assert_allclose(told(), slowly)
+    np.testing.assert_array_equal(told(), asked)
 
 
 @pytest.mark.parametrize("friction", [0.3, 0.6])

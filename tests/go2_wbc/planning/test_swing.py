@@ -204,8 +204,14 @@ def feet(until: float, *, touching: bool, above: float) -> Feet:
 
 @pytest.mark.parametrize(
     ("touching", "above", "share"),
-    [(True, 0.0, 0.9), (False, 0.05, 0.9), (True, 0.05, EARLIEST - 0.1)],
-    ids=["on the ground", "in the air", "too soon"],
+    [
+        (True, 0.0, 0.9),
+        (False, 0.05, 0.9),
+        (True, 0.05, EARLIEST - 0.1),
+        (False, 0.05, 1.05),
+        (True, 0.0, 1.5),
+    ],
+    ids=["on the ground", "in the air", "too soon", "just landed", "the others' turn"],
 )
 def test_feet_stand_when_it_is_planned(touching: bool, above: float, share: float) -> None:
     contacts = feet(share * SWING, touching=touching, above=above)

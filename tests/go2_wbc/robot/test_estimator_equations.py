@@ -147,11 +147,13 @@ class DocumentedFilter:
         self.age = np.where(reading.foot_forces > c.contact_force, self.age, -dt)
         slip = c.touchdown_slip * np.exp(-np.maximum(self.age, 0.0) / c.touchdown_time)
         x[5] = x[5] + dt * rolling.ravel()
-        vertical = c.vertical + c.vertical_share * np.hypot(*x[1][:2])
+        verticals = c.vertical + c.vertical_share * np.hypot(*x[1][:2])
+        verticals = verticals + c.landing * np.exp(-np.maximum(self.age, 0.0) / c.landing_time)
         seen = x[2]
         self.doubt = max(self.doubt - dt, 0.0)
         told: list[tuple[Callable[[list[np.ndarray]], np.ndarray], np.ndarray]] = []
         for leg in range(4):
+            vertical = verticals[leg]
             level = (c.velocity / trust[leg]) ** 2 + slip[leg] ** 2
             level += (c.velocity_share * speed[leg]) ** 2
             variance = np.array([level, level, level + vertical**2])

@@ -175,6 +175,7 @@ def test_how_far_a_foot_is_believed(
     slip = C.touchdown_slip * np.exp(-max(begun, 0.0) / C.touchdown_time)
     creep = C.velocity_share * 0.4
     variance = (C.velocity / trust) ** 2 + slip**2 + creep**2 if stays else 0.0
+    vertical += C.landing * np.exp(-max(begun, 0.0) / C.landing_time)
     risen = variance + vertical**2 if stays else 0.0
     np.testing.assert_allclose(foot.variance, [variance, variance, risen])
     own = C.settled_drift if begun > C.settled_time else C.foot_drift

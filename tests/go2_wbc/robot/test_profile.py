@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +69,20 @@ def test_feet_and_mass_of_the_simulated_robot_are_those_of_the_model(name: str) 
     np.testing.assert_allclose(plant.p_world_feet, p_feet, atol=1e-6)
     assert {plant.model.geom(f"{leg}_foot").size[0] for leg in ("FL", "RR")} == {model.foot_radius}
     np.testing.assert_array_equal(plant.torque_limits, model.torque_limits)
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_the_geometry_of_a_profile_is_that_of_its_urdf(name: str) -> None:
+    description, profile = find_description(robot=name), find_profile(name)
+    urdf = ET.parse(description.urdf_path).getroot()
+    foot = urdf.find("link[@name='FL_foot']/collision/geometry/sphere")
+    imu = urdf.find("joint[@name='imu_joint']/origin")
+    trunk = urdf.find("link[@name='trunk']/collision/geometry/box")
+    assert foot is not None and imu is not None and trunk is not None  # noqa: PT018
+    assert profile.foot_radius == float(foot.attrib["radius"])
+    assert profile.imu_place == tuple(map(float, imu.attrib["xyz"].split()))
+    half = 0.5 * np.array([float(size) for size in trunk.attrib["size"].split()])
+    np.testing.assert_allclose(np.abs(profile.underside_points), np.tile(half, (4, 1)), atol=1e-9)
 
 
 @EVERY

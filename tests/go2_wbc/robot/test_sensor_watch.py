@@ -198,6 +198,17 @@ def test_a_gyro_that_jumps_is_named_and_its_error_taken_off(axis: int) -> None:
     assert last.gyro == pytest.approx(np.zeros(3), abs=0.09)
 
 
+def test_a_foot_that_slides_is_no_error_of_the_gyro() -> None:
+    """Beside one that stands, as on the edge of a box: the line between both turns, and grows."""
+    q, v, tau = triple(STANDING[:3]), np.zeros(12), 2.0 * standing_torques()
+    J = [plain(leg_motion)(leg_table(MODEL).geometry[0], q, triple(e), ZERO)[1] for e in np.eye(3)]
+    v[:3] = np.linalg.solve(np.array(J).T, [0.0, 0.25, 0.0])
+    tau[3:9] = 0.0
+    noisy = [reading(k).v_joints for k in range(200)]
+    _, faults = watched(*(reading(k, v_joints=v + noisy[k], tau=tau) for k in range(200)))
+    assert [fault.part for fault in faults if fault.part == "gyro"] == []
+
+
 def test_a_robot_that_turns_has_a_sound_gyro() -> None:
     """Its feet turn about it as the gyro says."""
     w = np.array([0.0, 0.0, 0.6])
