@@ -22,6 +22,8 @@ SETTLING = 0.1
 """Time constant [s] of the sums."""
 ASKED = 0.25
 """Root mean square [N m] of what is asked, from which on a motor is judged."""
+NOISY_SPEED = 0.5
+"""Of that the damping of a joint that is read with noise asks this [rad/s] times its gain."""
 WEAK, DEAD = 0.65, 0.42
 """Share below which it is broken, and below which it is dead: of one that has just died so much is
 left in the sums when it is named, and half a torque is half a torque."""
@@ -67,7 +69,8 @@ def watch_motors(
         asked = min(max(asked, least), most)
         s.given[j] = keep * s.given[j] + (1.0 - keep) * given[j] * given[j]
         s.asked[j] = keep * s.asked[j] + (1.0 - keep) * asked * asked
-        is_weak = s.asked[j] > ASKED * ASKED and s.given[j] < WEAK * WEAK * s.asked[j]
+        least_asked = ASKED + kd[j] * NOISY_SPEED
+        is_weak = s.asked[j] > least_asked * least_asked and s.given[j] < WEAK * WEAK * s.asked[j]
         s.weak_time[j] = s.weak_time[j] + dt if is_weak else 0.0
         if s.weak_time[j] > LASTS and found < 0:
             found = j
