@@ -11,7 +11,7 @@ from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.records import Array4, Array12
 from go2_wbc.robot.state import PartFault, RobotState
 
-ASTRAY, LASTS = 0.03, 0.02
+ASTRAY, LASTS = 0.05, 0.02
 """Distance [m] from where a foot shall be by which it does not follow, and for how long [s]: the
 feet of sound robots, pushed with 90 N s too, for 0.01 at most."""
 UNFELT = 10.0

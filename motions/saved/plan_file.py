@@ -97,8 +97,9 @@ def is_saved_plan(name: str | Path) -> bool:
 
 
 def _arrays_of(file: Path) -> dict[str, np.ndarray]:
+    content = content_of(file)
     try:
-        with np.load(io.BytesIO(content_of(file)), allow_pickle=False) as archive:
+        with np.load(io.BytesIO(content), allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
     except (*UNREADABLE, KeyError) as error:
         raise MotionFileError(f"{file} is damaged, cut short, or no saved plan") from error

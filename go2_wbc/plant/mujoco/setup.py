@@ -35,7 +35,8 @@ DEFAULT_FRICTION = 0.8
     NOT_NEGATIVE,
     timestep=POSITIVE,
     control_period=POSITIVE,
-    **{name: between(*RANGES[name]) for name in ("friction", "payload", "mass_scale", "delay")},
+    payload=between(0.0, 4.0 * RANGES["payload"][1]),
+    **{name: between(*RANGES[name]) for name in ("friction", "mass_scale", "delay")},
     initial_yaw=FINITE,
     payload_place=FINITE,
 )

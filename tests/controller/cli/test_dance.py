@@ -68,4 +68,4 @@ def test_without_the_extra_the_install_line_is_said(
 ) -> None:
     monkeypatch.setitem(sys.modules, "librosa", None)
     said = run("dance", tmp_path / "song.wav", code=ExitCode.RUNTIME)
-    assert 'install -e ".[music]"' in said.err
+    assert 'install "go2-wbc[music]"' in said.err

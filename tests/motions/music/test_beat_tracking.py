@@ -117,5 +117,5 @@ def test_a_song_of_hours_is_refused_before_it_is_read(
 
 @pytest.mark.usefixtures("without_the_extra")
 def test_without_the_extra_the_error_names_it(tmp_path: Path) -> None:
-    with pytest.raises(MissingDependency, match=r'install -e "\.\[music\]"'):
+    with pytest.raises(MissingDependency, match=r'install "go2-wbc\[music\]"'):
         beats(saved(click_track(90.0, 4.0), tmp_path))

@@ -108,7 +108,7 @@ def set_key(name: str, value: object) -> Change:
         (lambda f: f["clock"].update(instants=[1.0]), "a tempo needs 2 beats or more, got 1"),
         (lambda f: f["keys"][3].update(shares=[1.5]), r"keys\[3\]: shares must be as many as"),
         (lambda f: f["keys"][3].update(through=[]), r"keys\[3\]: shares must be as many as"),
-        (lambda f: f.update(cursor=10**400), "too large"),
+        (lambda f: f.update(cursor=10**400), "cursor must be a finite number, got 1000"),
         (lambda f: f.pop("keys"), "keys must be a list, got None"),
         (lambda f: f.update(keys=[3]), r"keys\[0\] must be an object, got 3"),
         (lambda f: f["keys"].append(f["keys"][0]), "body pitch moves twice at once"),
