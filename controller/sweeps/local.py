@@ -98,7 +98,10 @@ class Worker:
         arguments = (its_end, order, {**os.environ, **ONE_THREAD})
         self._process = context.Process(target=serve, args=arguments, name="worker")
         with its_end, _start():
-            self._process.start()
+            try:
+                self._process.start()
+            except (EOFError, OSError):  # the server of processes has just died: another one
+                self._process.start()
         self.handles = (self._pipe, self._process.sentinel)
 
     def give(self, item: bytes) -> None:
