@@ -12,8 +12,9 @@ from go2_wbc.records import Array4, Array12
 from go2_wbc.robot.state import PartFault, RobotState
 
 ASTRAY, LASTS = 0.05, 0.02
-"""Distance [m] from where a foot shall be by which it does not follow, and for how long [s]: the
-feet of sound robots, pushed with 90 N s too, for 0.01 at most."""
+"""Distance [m] from where a foot shall be by which it does not follow, and for how long [s].
+In 78 minutes of random calls over 19 worlds, half of them pushed, 9 sound feet did not follow: at
+the face of a step, on boxes, or after a push."""
 UNFELT = 10.0
 """Force [N] below which a foot touches nothing: what stumbles is not held."""
 UPRIGHT = 0.3
