@@ -50,6 +50,7 @@ def content_text(content: ReplayContent, title: str, version: str = "") -> str:
         "labels": [[s.start, s.end, s.label] for s in content.recording.spans()],
         "force_scale": max(highest, _LEAST_FORCE_SCALE),
         "beats": list(content.beats),
+        "bar": content.bar,
         "end_pose": content.end_pose,
         "has_sound": bool(content.sound),
         "sliders": [asdict(slider) for slider in content.sliders],
