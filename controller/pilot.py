@@ -148,7 +148,8 @@ class Pilot:
     def _make_standing(self, entry: Posture, duration: float) -> Standing:
         own = self._loop.model.profile
         make_plan = partial(rise, entry=entry, duration=duration, profile=own)
-        friction = self._walker.walking.friction
+        walking = self._walker.walking
+        friction = walking.friction if walking.has_slid else None
         return Standing(make_plan, self._loop.model, self._config.locomotion, friction)
 
     def _settle(self, posture: Posture, what: str) -> Measurements:
