@@ -69,7 +69,7 @@ class GO2Controller:
         after_tick: Callable[[], None] = lambda: None,
         extra_tasks: Sequence[Task] = (),
     ) -> None:
-        """Take over a robot that lies on the ground, damped.
+        """Begin with a robot that lies on the ground, damped; one that stands: ``take_over``.
 
         Args:
             namespace: name of this robot: letters, digits and underscores, a letter first.
@@ -146,6 +146,10 @@ class GO2Controller:
     def recover(self) -> bool:
         """Get up and stand after a fall."""
         return self._call("recover", self._pilot.recover, allow_fallen=True)
+
+    def take_over(self) -> bool:
+        """Balance a robot that stands already, from how it stands. False if it does not stand."""
+        return self._call("take_over", self._pilot.take_over)
 
     def damp(self) -> None:
         """Go limp at once, safely; also ends a call that is running in another thread."""
@@ -297,10 +301,8 @@ class GO2Controller:
             departed = self._checker.departure(plan)
 
         def play() -> Measurements:
-            measured: Measurements = {}
-            for _ in range(times):
-                measured = self._pilot.play(plan, allow_dynamic=allow_dynamic)
-            return {**measured, **departed}
+            runs = [self._pilot.play(plan, allow_dynamic=allow_dynamic) for _ in range(times)]
+            return {**runs[-1], **departed}
 
         return self._call("play", play)
 
@@ -341,8 +343,7 @@ class GO2Controller:
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""
         self._check_open()
-        seconds = finite_number("seconds", seconds)
-        if seconds < 0.0:
+        if (seconds := finite_number("seconds", seconds)) < 0.0:
             raise CommandError(f"seconds must not be negative, got {seconds}")
         self._call("wait", lambda: self._pilot.wait(seconds), allow_fallen=True)
 
