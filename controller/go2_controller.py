@@ -6,7 +6,7 @@ import logging
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import NoReturn
@@ -104,7 +104,7 @@ class GO2Controller:
         with ExitStack() as opened:
             if plant is None:
                 plant = MujocoPlant(
-                    urdf=description.urdf_path,
+                    urdf=urdf,
                     robot=config.robot,
                     visuals=viewer,
                     motor=config.motor,
@@ -392,7 +392,7 @@ class GO2Controller:
     def recording(self, rate: float = 100.0) -> Recording:
         """The run so far (its last minutes), at about ``rate`` samples a second."""
         samples = self._runner.between_ticks(lambda: self.telemetry.samples(rate))
-        return samples.recording()
+        return replace(samples.recording(), model_file=self.plant.model_file)
 
     # --- ending ---------------------------------------------------------------------------
 
