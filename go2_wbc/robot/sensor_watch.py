@@ -33,6 +33,7 @@ from go2_wbc.robot.imu_watch import (
     WatchedImu,
     judge_accelerometer,
     judge_gyro,
+    judge_jump,
     note_bearing,
     note_turn,
 )
@@ -273,10 +274,11 @@ def watch_force(
         noise = min(abs(rise - s.rise[leg]), MOST_NOISE)
         s.noise[felt, leg] += (1.0 - np.exp(-dt / NOISE_TIME)) * (noise - s.noise[felt, leg])
     s.force[leg], s.rise[leg] = force, rise
-    is_dead = force < UNFELT and borne - slack > LOADED
+    is_noisy = max(s.noise[0, leg], s.noise[1, leg]) > NOISY
+    is_dead = force < UNFELT and borne - slack > (FREE if is_noisy else LOADED)
     is_against = is_dead or (force > SENSED and borne + slack < FREE)
-    lives = rise != 0.0 and max(s.noise[0, leg], s.noise[1, leg]) > NOISY
-    s.against[leg] = s.against[leg] + dt if is_against and carries and not lives else 0.0
+    is_against = is_against and carries and (rise == 0.0 or not is_noisy)
+    s.against[leg] = s.against[leg] + dt if is_against else 0.0
     has_changed = felt == 1 and abs(borne - s.load[leg]) > CHANGED
     is_same = s.force_same[leg] > SAME_TIME and (has_changed or s.noise[felt, leg] > NOISY)
     if carries and (is_same or s.against[leg] > FORCE_TIME):
@@ -289,6 +291,7 @@ def watch_force(
 def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt: float) -> None:
     """Hold the feet's forces against the legs' torques, and the IMU against feet that stand."""
     m = s.imu
+    jump = plus_scaled(triple(r.gyro), -1.0, triple(s.gyro))
     for i in range(3):
         s.gyro[i], s.accelerometer[i] = r.gyro[i], r.accelerometer[i]
         r.gyro[i] -= m.gyro_off[i]
@@ -313,6 +316,8 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
         stands = r.foot_forces[leg] > SENSED or borne[leg] - slack[leg] > LOADED
         is_used = stands and borne[leg] > LOADED and m.unborne == 0.0 and is_sound(s, leg)
         loads[leg] = borne[leg] if is_used else 0.0
+    m.is_found, m.turn[:] = 0.0, 0.0
+    judge_jump(m, jump, dt)
     watch_imu(s, r, c, places, speeds, loads, up, dt)
 
 
@@ -329,7 +334,6 @@ def watch_imu(
 ) -> None:
     """Let feet that stand judge the IMU: those with a load [N]; all in the base frame."""
     m, w, v = s.imu, triple(r.gyro), (0.0, 0.0, 0.0)
-    m.is_found, m.turn[:] = 0.0, 0.0
     for one in range(4):
         if loads[one] > 0.0:
             arm = plus_scaled(triple(places[one]), -1.0, triple(c.p_base_imu))
