@@ -68,6 +68,8 @@ foot that came down late; of 16 at 0.47 m/s none did (own simulation)."""
 ROUGH_PACE = 0.85
 """Speed [m/s] up to which that holds; as much faster, as much rougher: a robot at 3 m/s whose foot
 brushes the ground once in a swing goes on."""
+ROUGH_HASTE = 1.0 / 3.0
+"""Share of the accelerations that is left there."""
 CALMING = 0.8
 """Share of the roughness that is left after a landing."""
 STUMBLE = 0.06
@@ -172,6 +174,13 @@ def level_friction(g: Ground, friction: float, least: float) -> float:
     if g.roughness > SMOOTH:
         return friction
     return max((friction - steep) / (1.0 + friction * steep), least)
+
+
+@subroutine
+def haste(g: Ground, friction: float) -> float:
+    """Share of the greatest acceleration that the ground bears, by its ``friction`` and slope."""
+    share = level_friction(g, friction, LEAST_FRICTION) / MOST_FRICTION
+    return ROUGH_HASTE * share if g.rough_time > 0.0 else share
 
 
 @subroutine

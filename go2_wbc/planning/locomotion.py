@@ -30,6 +30,7 @@ from go2_wbc.planning.ground import (
     carry_ground,
     ground_at,
     ground_below,
+    haste,
     learn_ground,
     level_friction,
     note_stumble,
@@ -120,7 +121,8 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
     """Ramp velocity and pose, integrate to the place, apply the leash, correct the height."""
     trunk, config = s.trunk, c.config
     advance_pose(trunk.pose, trunk.pose_rate, config.pose, command.pose, dt)
-    ramp(trunk.velocity, command, config.linear_acceleration, config.angular_acceleration, dt)
+    linear = haste(s.ground, s.slip.friction) * config.linear_acceleration
+    ramp(trunk.velocity, command, linear, config.angular_acceleration, dt)
     follow_heading(trunk, now, config.yaw_leash, dt)
     if s.is_stepping:
         follow_position(trunk, now, config.position_leash, dt)

@@ -16,6 +16,7 @@ from go2_wbc.planning.ground import (
     MOST_RAISE,
     MOST_SLOPE,
     ROUGH,
+    ROUGH_HASTE,
     ROUGH_SPEED,
     ROUGH_TIME,
     SLIP_SPEED,
@@ -30,6 +31,7 @@ from go2_wbc.planning.ground import (
     exerted_ratio,
     ground_at,
     ground_below,
+    haste,
     learn_ground,
     level_friction,
     note_stumble,
@@ -107,6 +109,15 @@ def test_the_robot_goes_slowly_on_rough_ground_and_for_a_while_after_it() -> Non
     ground.roughness = 0.99 * ROUGH
     np.testing.assert_allclose(told(), slowly)
     np.testing.assert_array_equal(told(), asked)
+
+
+def test_the_robot_speeds_up_as_the_ground_bears_it() -> None:
+    level, slope = plane(on_plane(np.zeros(2))), plane(on_plane(SLOPE))
+    assert haste(level, MOST_FRICTION) == 1.0
+    assert haste(level, 0.5 * MOST_FRICTION) == pytest.approx(0.5)
+    assert haste(slope, MOST_FRICTION) < 1.0
+    level.rough_time = 0.1
+    assert haste(level, MOST_FRICTION) == pytest.approx(ROUGH_HASTE)
 
 
 @pytest.mark.parametrize("friction", [0.3, 0.6])
