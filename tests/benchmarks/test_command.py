@@ -163,3 +163,13 @@ def test_a_trial_on_sensors_is_the_same_trial_with_another_plant() -> None:
         np.testing.assert_array_equal(ideal.truth().q, plant.truth().q)
         assert plant.read().time == plant.truth().time
         assert not np.array_equal(plant.read().q, plant.truth().q)
+
+
+@pytest.mark.parametrize("words", ["border", "envelopes", "probability --motions 1"])
+def test_a_folder_that_cannot_be_made_is_told(
+    words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    rows = str(tmp_path / "file" / "in" / "rows.sqlite")
+    assert main([*words.split(), "--rows", rows]) == ExitCode.USAGE
+    assert "cannot make the folder" in capsys.readouterr().err
