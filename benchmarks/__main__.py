@@ -24,7 +24,6 @@ COMMANDS: tuple[Command, ...] = (
     Command("golden", "benchmarks.golden", "is every tick what it was, to the last bit?"),
     Command("plain", "benchmarks.plain", "does compiled code do what its own Python does?"),
     Command("speed", "benchmarks.speed", "processor time of the QP and of a control tick"),
-    Command("dynamic_motions", "benchmarks.dynamic_motions", "jumps, hops and rears in physics"),
     Command("probability", "benchmarks.probability", "is the stated chance the one that it has?"),
     Command("adversary", "benchmarks.adversary", "a search for motions that pass and fail"),
     Command("border", "benchmarks.border", "verdict and chance at the border of what is done"),
@@ -38,6 +37,7 @@ ALIASES = {"answers": "qp_infeasibility", "moonshots": "jump_limits", "trust": "
 GONE = {
     "jump_limits": "docs/explanation/dynamics.md has its results, commit 55f699b its program",
     "dynamics": "`nearest` measures what planning takes, commit 55f699b has the program",
+    "dynamic_motions": "`feasibility --rows dynamic` plays solved motions, and more of them",
     "false_negatives": "docs/feasibility.md has its results, commit 404d8b9 its program",
     "sweeps": "commit 55f699b has the program",
 }

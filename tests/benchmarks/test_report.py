@@ -90,7 +90,7 @@ def test_the_table_fits_80_columns_and_names_the_fallen_seed() -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        *("balance", "behaviour", "dance", "dynamic_motions", "locomotion"),
+        *("balance", "behaviour", "dance", "locomotion"),
         *("nearest", "qp_infeasibility", "steps"),
     ],
 )
