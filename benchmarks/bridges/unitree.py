@@ -51,7 +51,7 @@ STREAM: Final = (
 )
 DRIVE: Final = (
     ("steps", "steps not done, of 4", "<= 0"),
-    ("mae", "trot 0.5, MAE of true speed", "<= 0.04 m/s"),
+    ("mae", "trot 0.5, true speed: MAE", "<= 0.04 m/s"),
 )
 
 
