@@ -27,7 +27,6 @@ LONGEST = tuple(
         "test_notebooks.py",
         "controller/bridges/unitree/test_foreign_peers.py",
         "test_docs.py",
-        "test_site.py",
         "viz/replay/test_plan_browser.py",
         "viz/replay/test_live_browser.py",
         "viz/replay/test_browser.py",
