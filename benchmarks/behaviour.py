@@ -4,8 +4,6 @@ Here: standing up and reaching a goal. The other rows have files of their own; h
 followed is in ``locomotion``, what pushes are survived in ``balance``.
 """
 
-from __future__ import annotations
-
 import math
 
 from benchmarks import demo_sequence, high_five, library, model

@@ -1,7 +1,5 @@
 """What the commands of the benchmarks share: their options, running studies, what is told."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -10,8 +10,6 @@ of 7300 to 7319 had been seen before the last settings were chosen; none of thos
 here was looked at before.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Means, deviations, worst seeds and verdicts, as a table of at most 80 columns and as JSON."""
 
-from __future__ import annotations
-
 import math
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence

@@ -5,8 +5,6 @@ repetitions in long loops are checked now and again only (see ``tests/typechecke
 ``GO2_WBC_TYPECHECK=0`` switches them off. pytest-xdist workers load this file too.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 from pathlib import Path

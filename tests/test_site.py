@@ -1,7 +1,5 @@
 """The documentation needs no network, its links lead somewhere, and what it is made of."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Unitree's protocol between real processes on the loopback: the sport service, the low level."""
 
-from __future__ import annotations
-
 import json
 import time
 import timeit

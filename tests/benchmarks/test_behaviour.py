@@ -1,7 +1,5 @@
 """What the rows of ``behaviour`` measure."""
 
-from __future__ import annotations
-
 from contextlib import closing
 from dataclasses import replace
 

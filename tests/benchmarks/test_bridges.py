@@ -1,7 +1,5 @@
 """Which benchmarks of the bridges a name stands for, and what is said when one cannot run."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """``python -m benchmarks``: what is run, what is printed and written, which exit code."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

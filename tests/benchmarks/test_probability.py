@@ -1,7 +1,5 @@
 """The stated chance: which motion is played in which world, the fit, what is stored and shown."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """The report counts honestly: means, worst seeds, falls."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import math

@@ -1,7 +1,5 @@
 """An interrupted run goes on where it ended; what does not fit is refused."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

@@ -3,8 +3,6 @@
 The full numbers, over 10 to 200 seeds, come from ``python -m benchmarks behaviour`` and others.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from pathlib import Path
 

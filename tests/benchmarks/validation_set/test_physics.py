@@ -1,7 +1,5 @@
 """What counts as having gone wrong, by each definition."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The exam's motions: every family writes, at any amplitude, and the halves stay apart."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

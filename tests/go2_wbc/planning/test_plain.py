@@ -1,7 +1,5 @@
 """What runs compiled is the Python that is written: one planner each way, tick by tick."""
 
-from __future__ import annotations
-
 import itertools
 from contextlib import suppress
 from dataclasses import replace
