@@ -1,7 +1,5 @@
 """Every gait that has a name walks at the edge of its envelope, rests, and does what comes next."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np
