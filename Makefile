@@ -70,8 +70,9 @@ format: $(VENV)/.stamp-dev ## fix what lint and formatting can fix
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-docs: $(VENV)/.stamp-dev ## build the documentation site in docs/_build/html
+docs: $(VENV)/.stamp-dev ## build the documentation site in docs/_build/html, follow its links
 	$(BIN)/python -m sphinx -W --keep-going -q docs docs/_build/html
+	GO2_WBC_SITE=docs/_build/html $(BIN)/python -m pytest -n 0 -q tests/test_site.py
 
 bench: $(VENV)/.stamp-run ## run a benchmark: make bench ARGS='behaviour --quick'
 	$(BIN)/python -m benchmarks $(ARGS)

@@ -7,8 +7,6 @@ refuses is halved, which leads along the border of what it passes. The search kn
 verdict and its chance, and of physics what was played; limits, margins and equations it does not.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Sequence

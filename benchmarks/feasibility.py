@@ -6,8 +6,6 @@ says. Families of motions lie in one half each: thresholds of the check may be s
 only, and of the test half no single motion is shown.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Robots on trial, what pushes them, and what is true of them by the simulator."""
 
-from __future__ import annotations
-
 import atexit
 import math
 import shutil

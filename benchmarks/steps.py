@@ -5,8 +5,6 @@ gaits were chosen by the check and on two runs on the nominal floor; no
 seed of theirs is judged here.
 """
 
-from __future__ import annotations
-
 import math
 from functools import cache, partial
 

@@ -17,12 +17,13 @@ from controller.behaviours.standing import Standing
 from controller.checks import (
     LYING_HEIGHT,
     base_height,
-    is_lying,
-    is_sitting,
     is_standing,
+    lying,
+    sitting,
+    standing,
     why_not_standing,
 )
-from controller.modes import Aborted, Measurements, Mode, listed
+from controller.modes import Aborted, Measurements, Mode, listed, told
 from controller.navigation import Goal
 from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
@@ -80,10 +81,9 @@ class Pilot:
         """The velocity command that is being followed."""
         return self._walker.command if self.mode is Mode.WALKING else ZERO_COMMAND
 
-    @property
-    def limits(self) -> str:
-        """The envelope to which velocity commands are clipped, in plain words."""
-        return self._walker.limits
+    def excess(self, command: VelocityCommand) -> tuple[int, str]:
+        """How far ``command`` is beyond what is followed (0 if not, 2 by far), and in words."""
+        return self._walker.excess(command)
 
     @property
     def body_pose(self) -> BodyPose:
@@ -163,12 +163,13 @@ class Pilot:
     def _make_standing(self, entry: Posture, duration: float) -> Standing:
         own = self._loop.model.profile
         make_plan = partial(rise, entry=entry, duration=duration, profile=own)
-        friction = self._walker.walking.friction
+        walking = self._walker.walking
+        friction = walking.friction if walking.has_slid else None
         return Standing(make_plan, self._loop.model, self._config.locomotion, friction)
 
     def _settle(self, posture: Posture, what: str) -> Measurements:
-        _, check = _RESTING[posture]
-        self._runner.settle(what, check)
+        _, asked = _RESTING[posture]
+        self._runner.settle(what, asked)
         return self._arrive(posture)
 
     def _arrive(self, posture: Posture) -> Measurements:
@@ -257,8 +258,8 @@ class Pilot:
         measured = goal.measurements(loop.state)
         if was_halted:
             raise Aborted(f"{goal.name} ended by stop()", measured)
-        if not goal.is_within_tolerance(loop.state):
-            raise Aborted(f"{goal.name} missed: {listed(measured)}", measured)
+        if why := told(goal.errors(loop.state)):
+            raise Aborted(f"{goal.name} missed: {why}; {listed(measured)}", measured)
         return measured
 
     def halt(self) -> bool:
@@ -363,11 +364,11 @@ class Pilot:
 
 
 _RESTING = {
-    Posture.LIE: (Mode.LYING, is_lying),
-    Posture.SIT: (Mode.SITTING, is_sitting),
-    Posture.STAND: (Mode.STANDING, is_standing),
+    Posture.LIE: (Mode.LYING, lying),
+    Posture.SIT: (Mode.SITTING, sitting),
+    Posture.STAND: (Mode.STANDING, standing),
 }
-"""The mode of a robot that rests in a posture, and whether it does."""
+"""The mode of a robot that rests in a posture, and what is asked of it then."""
 
 
 def _refuse_dynamic_on_hardware(plan: MotionPlan, plant: Plant) -> None:

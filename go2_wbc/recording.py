@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import zipfile
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from importlib.metadata import entry_points
 from itertools import groupby, pairwise
 from pathlib import Path
@@ -58,6 +58,8 @@ class Recording:
         support_margin: (n,) distance [m] of the CoM's ground projection to the edge of the
             support polygon of the planned stance feet, positive inside; nan with fewer than three.
         labels: what the robot was doing at each sample ("stand", "walk", ...), length n.
+        robot: name of the robot's profile.
+        model_file: its own MJCF or URDF, by which it is drawn; empty if it has none.
     """
 
     time: Float[np.ndarray, " n"]
@@ -69,6 +71,8 @@ class Recording:
     p_world_com: Float[np.ndarray, "n 3"]
     support_margin: Float[np.ndarray, " n"]
     labels: tuple[str, ...]
+    robot: str = "go2"
+    model_file: str = ""
 
     _repr_html_ = inline_html
 
@@ -89,8 +93,8 @@ class Recording:
             rows: of the samples to keep, in increasing order.
         """
         labels = np.array(self.labels, dtype=object)[rows]
-        arrays = (getattr(self, field.name)[rows] for field in fields(self)[:-1])
-        return Recording(*arrays, labels=tuple(labels))
+        arrays = {name: getattr(self, name)[rows] for name in _ARRAYS}
+        return replace(self, **arrays, labels=tuple(labels))
 
     def save(self, path: Path | str) -> Path:
         """Write it to a ``.npz`` file, which ``load`` and ``numpy.load`` read; gives its path.
@@ -105,17 +109,21 @@ class Recording:
 
     @staticmethod
     def load(path: Path | str) -> Recording:
-        """What ``save`` has written.
+        """What ``save`` has written, also before a recording said which robot it holds: a Go2.
 
         Raises:
             ConfigError: if the file is missing, damaged, or no recording.
         """
         try:
             with np.load(io.BytesIO(Path(path).read_bytes()), allow_pickle=False) as file:
-                *arrays, labels = (file[field.name] for field in fields(Recording))
+                values: dict[str, Any] = {name: file[name] for name in _ARRAYS}
+                values |= {
+                    name: str(file[name]) for name in ("robot", "model_file") if name in file
+                }
+                labels = tuple(file["labels"].tolist())
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
             raise ConfigError(f"{path} is missing, damaged, or no recording of save()") from error
-        return Recording(*arrays, labels=tuple(labels.tolist()))
+        return Recording(**values, labels=labels)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """A pandas table, a row for each sample: ``time``, ``label``, ``q0`` to ``q18`` and so on.
@@ -129,12 +137,12 @@ class Recording:
             line = install_line("examples")
             raise MissingDependency(f"a table needs pandas ({error}): {line}") from error
         columns: dict[str, object] = {"time": self.time, "label": self.labels}
-        for field in fields(self)[1:-1]:
-            values = getattr(self, field.name)
+        for name in _ARRAYS[1:]:
+            values = getattr(self, name)
             if values.ndim == 1:
-                columns[field.name] = values
+                columns[name] = values
             else:
-                columns |= {f"{field.name}{i}": column for i, column in enumerate(values.T)}
+                columns |= {f"{name}{i}": column for i, column in enumerate(values.T)}
         return pandas.DataFrame(columns)
 
     def export(self, path: Path | str) -> Path:
@@ -182,3 +190,7 @@ def viewer(name: str) -> Any:  # noqa: ANN401 - each makes something else of a r
     except (ImportError, IndexError) as error:
         line = install_line(name) if name in EXTRAS else "python -m pip install go2-wbc"
         raise MissingDependency(f"{name} is not installed ({error}): {line}") from error
+
+
+_ARRAYS = tuple(field.name for field in fields(Recording))[:8]
+"""The fields that have a row for each sample."""

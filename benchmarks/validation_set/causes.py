@@ -4,8 +4,6 @@ They were written after the causes were found, so they say whether these are men
 motions that nobody has thought of: that is what the exam is for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from benchmarks.validation_set.drawing import Draw, Family

@@ -1,7 +1,5 @@
 """Searches for motions that pass and fail: what they climb, what is counted, one that was found."""
 
-from __future__ import annotations
-
 import json
 from types import SimpleNamespace
 

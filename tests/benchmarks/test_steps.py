@@ -1,7 +1,5 @@
 """The benchmark of steps: what is walked is what the table says, and how frames go on."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

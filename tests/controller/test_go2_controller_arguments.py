@@ -1,7 +1,5 @@
 """Bad input is refused at once, by an error that says what was wrong and what is valid."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -133,6 +133,7 @@ class MujocoPlant(Plant):
         self._model, self._layout, self._motor, self._description = prepare(setup)
         self._data = mujoco.MjData(self._model)
         self.robot = self._description.profile.name
+        self.model_file = str(Path(mjcf or urdf or "").absolute()) if mjcf or urdf else ""
         if mjcf is not None and joint_dynamics is None:  # of what is built here nobody is told
             self.joint_damping = tuple(self._model.dof_damping[self._layout.joint_v].tolist())
         self._noise = (noise or SensorNoise()) if sensors == "noisy" else None

@@ -4,8 +4,6 @@ What physics does, ``python -m benchmarks feasibility --rows causes`` plays; it 
 this was written.
 """
 
-from __future__ import annotations
-
 import pytest
 
 from benchmarks.validation_set.causes import examples

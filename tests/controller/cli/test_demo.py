@@ -1,7 +1,5 @@
 """``go2-wbc demo``: what a person sees, what a program reads, and which files are left."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

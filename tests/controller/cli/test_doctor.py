@@ -1,7 +1,5 @@
 """The doctor finds each known illness, names the line that cures it, and likes a healthy body."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import json
 import sys

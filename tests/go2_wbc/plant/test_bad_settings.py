@@ -1,7 +1,5 @@
 """Settings and robot files that make no sense are refused by errors of our own, by name."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The simulated Go2 keeps the plant contract and Pinocchio's conventions, and is repeatable."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
