@@ -59,6 +59,9 @@ FINER = 1.0 / 3.0
 FORCE_LIMIT, FORCE_LASTS, STAYING = 0.45, 0.25, 0.62
 """Error of the accelerometer [m/s^2] that is named, if it lasts so long [s] without falling below
 this share of what it was: what a blow leaves fades."""
+UPWARDS, UPWARDS_LASTS = 0.85, 0.14
+"""Share of it by which it points up or down, and how long [s] it lasts then: feet slide sideways,
+and a trot that believes it rises falls soon."""
 
 TILTED, TILT_LASTS, TILT_SHARE = 2.0, 0.1, 0.7
 """Once the gyro has erred, an error of the accelerometer is a tilt that it has left: taken back
@@ -252,7 +255,9 @@ def judge_accelerometer(
     elif stands:
         m.force_time += dt
         m.most_excess = max(m.most_excess, amount)
-    if m.force_time > (TILT_LASTS if is_tilt else FORCE_LASTS) and m.gyro_time == 0.0:
+    is_upwards = abs(dot(triple(m.excess), up)) > UPWARDS * amount
+    lasts = TILT_LASTS if is_tilt else UPWARDS_LASTS if is_upwards else FORCE_LASTS
+    if m.force_time > lasts and m.gyro_time == 0.0:
         m.force_time, m.is_found = 0.0, 1.0
         if is_tilt:
             by = cross(up, triple(m.excess))
