@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Bool, Float
 
-from go2_wbc.brief import brief
 from go2_wbc.algebra.linear import cross, dot, triple
+from go2_wbc.brief import brief
 from go2_wbc.compilation import Foreign, kernel
 from go2_wbc.errors import CommandError
 from go2_wbc.lazy import moved_names

@@ -35,6 +35,7 @@ from go2_wbc.robot.imu_watch import (
     judge_gyro,
     judge_jump,
     note_bearing,
+    note_push,
     note_turn,
 )
 from go2_wbc.robot.leg_kinematics import LegGeometry, Legs, leg_table
@@ -295,6 +296,7 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
     w = triple(r.gyro)
     places, speeds = np.empty((4, 3)), np.empty((4, 3))
     borne, slack, loads = np.empty(4), np.empty(4), np.empty(4)
+    push, per_mass = (0.0, 0.0, 0.0), c.gravity / c.weight
     for leg in range(4):
         j = slice(3 * leg, 3 * leg + 3)
         q, v = triple(r.q_joints[j]), triple(r.v_joints[j])
@@ -302,8 +304,9 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
         place, u, force, slack[leg] = leg_motion(c.legs.geometry[leg], q, v, tau)
         put(place, places[leg])
         put(less_rolling(q, v, u, w, up, c.foot_radius), speeds[leg])
-        borne[leg] = force[2]
+        borne[leg], push = force[2], plus_scaled(push, per_mass, force)
     moved = plus_scaled(triple(r.accelerometer), -c.gravity, up)
+    note_push(m, push, dt)
     is_up = up[2] > UPRIGHT
     is_borne = is_up and borne.sum() > CARRIED * c.weight
     note_bearing(m, is_up and dot(moved, moved) < THROWN**2, is_borne, dt)
