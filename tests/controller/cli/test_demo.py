@@ -234,8 +234,8 @@ def test_a_run_without_these_moments_leaves_the_choice_to_the_filmstrip() -> Non
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
-    [[], ["--backend", "placo"], ["--backend", "full", "--solver", "proxqp"]],
-    ids=["default", "placo", "full proxqp"],
+    [[], ["--backend", "full", "--solver", "proxqp"]],
+    ids=["default", "full proxqp"],
 )
 def test_the_real_demo_does_every_step_inside_the_limits(
     tmp_path: Path, options: list[str]
