@@ -17,6 +17,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("envelopes", "benchmarks.envelopes", "the greatest speed of each gait, and store it"),
     Command("balance", "benchmarks.balance", "pushes, drops, gait changes; falls noticed"),
     Command("combined", "benchmarks.combined", "coming to rest; worlds hard in several ways"),
+    Command("rough", "benchmarks.rough", "stairs, blocks, slopes, waves, blind; reversals"),
     Command("faults", "benchmarks.faults", "broken parts: named in time, and outlived"),
     Command("sequences", "benchmarks.sequences", "random calls: does every answer hold?"),
     Command("dance", "benchmarks.dance", "dances against the true beats of their songs"),

@@ -75,7 +75,8 @@ def unitree_sim(
     require_dds()
     from controller.bridges.unitree.simulator import SimulatorSettings, UnitreeSimulator
 
-    logging.getLogger("controller.bridges").setLevel(logging.INFO)
+    for name in ("controller.bridges", "controller.loop"):
+        logging.getLogger(name).setLevel(logging.INFO)
     stop = _until_signal()
     settings = SimulatorSettings(
         domain, interface, mjcf, friction, payload, sensors, seed, config, lockstep

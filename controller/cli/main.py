@@ -19,14 +19,18 @@ from dataclasses import dataclass
 
 from controller.cli.common import PROGRAM, ExitCode, Subparsers, examples_epilog, installed_version
 from controller.cli.options import add_command
+from controller.pacing import REASON
 from go2_wbc.errors import (
     CommandError,
     ConfigError,
     Go2WbcError,
     IkError,
+    ModelMismatch,
     MotionError,
+    MotionFileError,
     QpInfeasible,
     SolverUnavailable,
+    TimelineError,
 )
 
 
@@ -89,11 +93,12 @@ go2-wbc COMMAND --help   the options of a command, with examples
 """
 
 EXIT_CODES: tuple[tuple[tuple[type[Go2WbcError], ...], ExitCode], ...] = (
+    ((CommandError, ConfigError, SolverUnavailable, ModelMismatch), ExitCode.USAGE),
+    ((TimelineError, MotionFileError), ExitCode.USAGE),
     ((MotionError, QpInfeasible, IkError), ExitCode.FAILED),
-    ((CommandError, ConfigError, SolverUnavailable), ExitCode.USAGE),
     ((Go2WbcError,), ExitCode.RUNTIME),
 )
-"""The exit code of an error; the first row that fits counts."""
+"""The exit code of an error, of every command; the first row that fits counts."""
 
 _OURS = frozenset({"go2_wbc", "controller", "motions", "viz", "benchmarks"})
 
@@ -122,7 +127,7 @@ def run_program(program: Program, argv: Sequence[str] | None = None) -> int:
         argv: arguments without the program's name; by default those of the process.
 
     Returns:
-        0 fine, 1 infeasible or failed, 2 usage, 3 runtime error, 130 interrupted.
+        See ``ExitCode``.
     """
     try:
         try:
@@ -152,14 +157,23 @@ def _run(program: Program, argv: list[str]) -> int:
         args = parser.parse_args(argv)
     except SystemExit as stop:  # argparse has printed its help, version or complaint
         return stop.code if isinstance(stop.code, int) else ExitCode.USAGE
+    shown = logging.StreamHandler()
+    shown.addFilter(_is_news)
     logging.basicConfig(
         level=logging.INFO if args.verbose else logging.WARNING,
         format="%(levelname)s: %(message)s",
+        handlers=[shown],
     )
     if args.run is None:
         parser.print_help(sys.stderr)
         return ExitCode.USAGE
     return args.run(args)
+
+
+def _is_news(record: logging.LogRecord) -> bool:
+    """Whether a log line says more than what commands print of the robot that they drive."""
+    is_service = logging.getLogger(record.name).isEnabledFor(logging.INFO)  # or it is verbose
+    return is_service or record.msg != REASON
 
 
 def build_parser(program: Program, requested: str | None) -> argparse.ArgumentParser:

@@ -7,7 +7,9 @@ and v that of the IMU by the feet that stand, weighted by what they bear, all in
     accelerometer   d/dt s = a - w x s - R'g + (v - s) / T    (s - v) / T is its error
 
 Feet that slip do not turn together: an error of the gyro has to explain their residual, or to come
-with one of the accelerometer: feet seem to move otherwise, and soon gravity lies wrong. s is the
+with one of the accelerometer: feet seem to move otherwise, and soon gravity lies wrong. Where the
+gyro jumps from one reading to the next, whether the feet jump along is known at once, and of an
+error then all of it, also about the line between two feet of a trot. s is the
 velocity that the accelerometer integrates to, drawn to the feet's; between two steps nothing draws
 it. What has been wrong for a while is named and taken off, and so is what it has done to s.
 """
@@ -38,8 +40,15 @@ FOUND_AFTER, FOUND_SHARE = 0.2, 0.8
 it that the sums have taken in by then: 1 - exp(-0.16 / 0.1)."""
 REFINING = 0.2
 """Time [s] over which what is left of it is measured then: both pairs of a trot's feet stand."""
-EXPLAINED = 0.3
-"""Share of the feet's squared residual that an error of the gyro explains, if it is one."""
+EXPLAINED, UNEXPLAINED = 0.3, 0.3
+"""Share of the feet's squared residual that an error of the gyro explains, if it is one, and what
+else they may turn by [rad/s]: one that lies down on slippery ground slides by 0.46."""
+JUMP, SEEN, JUMP_LASTS, LONGEST_JUMP = 0.3, 0.4, 0.03, 0.25
+"""Change of the gyro from one reading to the next [rad/s] that may be an error; what feet that do
+not jump along have to show of it [m^2/s^2], for how long at least [s], and at most."""
+JUMP_SHARE, NO_JUMP, JUMP_EXPLAINED = (0.7, 1.4), 0.5, 0.7
+"""Range of the share of the jump that they lack, if it is an error; share below which it is none;
+and the share of their squared residual that an error explains: 0.75 to 0.99, others 0.6 at most."""
 WITH_FORCE = 0.16
 """Time [s] after which an error of the accelerometer speaks for one of the gyro, if it has one."""
 UNSEEN = 0.5
@@ -66,6 +75,9 @@ class WatchedImu(Record):
         turning, turned, residual: normal equations of the gyro's error, and the squared residual.
         gyro_off, gyro_time: the error that is taken off [rad/s], for how long there has been one.
         refining: for how long what is left is still measured [s].
+        jump, jump_time: the last of the gyro [rad/s], and for how long it is looked at [s].
+        jump_seen, jump_lacks, jump_residual: sums of f . f, f . e and e . e, where feet that stand
+            would seem to move apart by f, if it were an error, and do so by e [m^2/s^2].
         since: time since an error of the gyro was taken off [s].
         speed: of the IMU by the accelerometer, drawn to that by the feet [m/s].
         excess, most_excess: error of the accelerometer, smoothed once more, and the greatest while
@@ -84,6 +96,11 @@ class WatchedImu(Record):
     gyro_off: Array3
     gyro_time: float
     refining: float
+    jump: Array3
+    jump_time: float
+    jump_seen: float
+    jump_lacks: float
+    jump_residual: float
     since: float
     speed: Array3
     excess: Array3
@@ -119,7 +136,12 @@ def note_turn(m: WatchedImu, between: V3, apart: V3, w: V3) -> None:
     e = (apart[0] + moved[0], apart[1] + moved[1], apart[2] + moved[2])
     b = cross(between, e)
     length = between[0] * between[0] + between[1] * between[1] + between[2] * between[2]
-    m.residual += e[0] * e[0] + e[1] * e[1] + e[2] * e[2]
+    m.residual += dot(e, e)
+    if m.jump_time > 0.0:
+        seen = cross(triple(m.jump), between)
+        m.jump_seen += dot(seen, seen)
+        m.jump_lacks += dot(seen, e)
+        m.jump_residual += dot(e, e)
     for i in range(3):
         m.turned[i] += b[i]
         m.turning[i, i] += length
@@ -162,8 +184,9 @@ def judge_gyro(m: WatchedImu, dt: float) -> None:
         if m.refining <= 0.0:
             take_off(m, error, FOUND_AFTER + REFINING)
         return
-    explained = error[0] * m.turned[0] + error[1] * m.turned[1] + error[2] * m.turned[2]
-    is_large = dot(error, error) > GYRO_LIMIT**2
+    explained = dot(error, triple(m.turned))
+    most = UNEXPLAINED**2 * (m.turning[0, 0] + m.turning[1, 1] + m.turning[2, 2])
+    is_large = dot(error, error) > GYRO_LIMIT**2 and m.residual - explained < most
     is_off = is_large and explained > EXPLAINED * m.residual
     m.gyro_time = m.gyro_time + dt if is_off else 0.0
     if m.gyro_time > GYRO_LASTS or (is_large and m.force_time > WITH_FORCE):
@@ -173,9 +196,30 @@ def judge_gyro(m: WatchedImu, dt: float) -> None:
 
 
 @subroutine
+def judge_jump(m: WatchedImu, change: V3, dt: float) -> None:
+    """Take off what the gyro has jumped by since the last reading if the feet lack it for a while.
+
+    With f and e of each pair the share that they lack is sum f . e / sum f . f, least squares.
+    """
+    if m.jump_time > 0.0:
+        m.jump_time += dt
+        is_told = m.jump_seen > SEEN and m.jump_time > JUMP_LASTS
+        explains = m.jump_lacks**2 > JUMP_EXPLAINED * m.jump_seen * m.jump_residual
+        share = m.jump_lacks / m.jump_seen if m.jump_seen > 0.0 else 1.0
+        if is_told and explains and JUMP_SHARE[0] < share < JUMP_SHARE[1]:
+            m.gyro_is_off, m.refining = 1.0, REFINING
+            take_off(m, triple(m.jump), m.jump_time)
+        elif share < NO_JUMP or m.jump_time > LONGEST_JUMP:
+            m.jump_time = 0.0
+    if m.jump_time == 0.0 and m.stood >= CALM and dot(change, change) > JUMP**2:
+        put(change, m.jump)
+        m.jump_time, m.jump_seen, m.jump_lacks, m.jump_residual = dt, 0.0, 0.0, 0.0
+
+
+@subroutine
 def take_off(m: WatchedImu, error: V3, time: float) -> None:
     """Take an error of the gyro off that has been there for so long [s]."""
-    m.gyro_time, m.is_found, m.stood, m.since = 0.0, 1.0, CALM, 0.0
+    m.gyro_time, m.jump_time, m.is_found, m.stood, m.since = 0.0, 0.0, 1.0, CALM, 0.0
     for i in range(3):
         m.gyro_off[i] += error[i]
         m.turn[i] = time * error[i]

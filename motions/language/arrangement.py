@@ -141,7 +141,7 @@ class Arrangement(TimelineData):
 
     def repeat(self, times: int) -> Self:
         """This whole motion, ``times`` times one after another; it must end as it began."""
-        if isinstance(times, bool) or not isinstance(times, int) or times < 1:
+        if not (isinstance(times, int) and is_number(times) and times >= 1):
             raise TimelineError(f"repeat() needs a whole number of 1 or more, got {times!r}")
         self._require_length(times * max(self.end, SHORTEST))
         return self.then(*[self] * (times - 1))

@@ -66,9 +66,8 @@ def robot_scene(visuals: RobotVisuals, pack: Pack) -> dict[str, object]:
         axis = np.ravel(model.joints[joint].createData().S)[3:].tolist()
         joints.append({"path": paths[joint], "axis": axis})
     for item in visuals.geometry.geometryObjects:
-        link = model.frames[item.parentFrame].name
         for row, part in enumerate(visuals.meshes[item.meshPath]):
-            node = scene[f"{paths[item.parentJoint]}/{link}_{row}"]
+            node = scene[f"{paths[item.parentJoint]}/{item.name}_{row}"]
             node.set_object(SharedMesh(table[item.meshPath, row]), _material(part))
             node.set_transform(item.placement.homogeneous)
     _add_markers(scene)
