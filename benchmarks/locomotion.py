@@ -25,8 +25,6 @@ where the robot lies:
 ``benchmarks.unknown_world`` has the groups ``unknown``, ``unknown-sensors`` and ``robots``.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import partial

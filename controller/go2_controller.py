@@ -16,6 +16,7 @@ from controller import arguments
 from controller.assembly import build_pilot
 from controller.modes import Aborted, Measurements, Mode, Outcome
 from controller.navigation import DriveStraight, TurnInPlace
+from controller.pacing import REASON, LogOnce
 from controller.telemetry import Telemetry
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
@@ -69,7 +70,7 @@ class GO2Controller:
         after_tick: Callable[[], None] = lambda: None,
         extra_tasks: Sequence[Task] = (),
     ) -> None:
-        """Take over a robot that lies on the ground, damped.
+        """Begin with a robot that lies on the ground, damped; one that stands: ``take_over``.
 
         Args:
             namespace: name of this robot: letters, digits and underscores, a letter first.
@@ -119,7 +120,7 @@ class GO2Controller:
             self._resources = opened.pop_all()
         self._runner, self._description = self._pilot.runner, description
         self._motor, self._limits = config.motor, config.feasibility
-        self._closed = False
+        self._closed, self._clipped = False, LogOnce(_log)
         self._turn: dict[str, _Call] = {}  # what runs: one entry, or none
         self._last = Outcome(True, "lying, nothing asked yet", 0.0)
         self._planning = threading.Lock()
@@ -141,6 +142,10 @@ class GO2Controller:
     def recover(self) -> bool:
         """Get up and stand after a fall."""
         return self._call("recover", self._pilot.recover, allow_fallen=True)
+
+    def take_over(self) -> bool:
+        """Balance a robot that stands already, from how it stands. False if it does not stand."""
+        return self._call("take_over", self._pilot.take_over)
 
     def damp(self) -> None:
         """Go limp at once, safely; also ends a call that is running in another thread."""
@@ -176,6 +181,8 @@ class GO2Controller:
     ) -> None:
         """Walk like this until the next command; takes no time by itself.
 
+        A velocity beyond the envelope of the gait is clipped to it; the first one is warned of.
+
         Args:
             linear_x: forward speed [m/s], negative is backward.
             angular_z: turning rate [rad/s], positive is left.
@@ -191,10 +198,8 @@ class GO2Controller:
         """
         self._check_open()
         wanted = VelocityCommand(linear_x, linear_y, angular_z)
-        pose, limits = BodyPose(height, roll, pitch, yaw), self._pilot.limits
-        followed = self._pilot.set_command(wanted, pose)
-        if followed != wanted:
-            _log.warning("velocity command clipped from %s to %s: %s", wanted, followed, limits)
+        self._pilot.set_command(wanted, BodyPose(height, roll, pitch, yaw))
+        self._clipped.warn(*self._pilot.excess(wanted))
 
     def stop(self) -> None:
         """Zero velocity: the robot comes to rest in walking mode.
@@ -301,10 +306,8 @@ class GO2Controller:
             departed = self._checker.departure(plan)
 
         def play() -> Measurements:
-            measured: Measurements = {}
-            for _ in range(times):
-                measured = self._pilot.play(plan, allow_dynamic=allow_dynamic)
-            return {**measured, **departed}
+            runs = [self._pilot.play(plan, allow_dynamic=allow_dynamic) for _ in range(times)]
+            return {**runs[-1], **departed}
 
         return self._call("play", play)
 
@@ -349,8 +352,7 @@ class GO2Controller:
             CommandError: for what is no finite number of 0 or more.
         """
         self._check_open()
-        seconds = finite_number("seconds", seconds)
-        if seconds < 0.0:
+        if (seconds := finite_number("seconds", seconds)) < 0.0:
             raise CommandError(f"seconds must not be negative, got {seconds}")
         self._call("wait", lambda: self._pilot.wait(seconds), allow_fallen=True)
 
@@ -474,13 +476,19 @@ class GO2Controller:
             self._note(call, str(aborted), aborted.measured)
             return False
         except Go2WbcError as error:
-            self._note(call, str(error))
+            self._note(call, str(error), is_raised=True)
             raise
         self._note(call, "done", measured, ok=True)
         return True
 
     def _note(
-        self, call: _Call, reason: str, measured: Measurements | None = None, *, ok: bool = False
+        self,
+        call: _Call,
+        reason: str,
+        measured: Measurements | None = None,
+        *,
+        ok: bool = False,
+        is_raised: bool = False,
     ) -> None:
         """What came of ``call``, and which parts are broken that the reason does not name."""
         if untold := [str(f) for f in self.health.faults if str(f) not in reason]:
@@ -488,11 +496,11 @@ class GO2Controller:
         duration = self._runner.loop.state.time - call.start
         self._last = Outcome(ok, reason, duration, dict(measured or {}))
         fault = self._runner.loop.fault
-        is_known = fault is not None and fault.reason in reason  # the loop has logged it
-        if ok:
+        is_told = is_raised or (fault is not None and fault.reason in reason)  # logged by the loop
+        if ok or is_told:
             _log.info("%s() after %.2f s: %s", call.name, duration, reason)
-        elif not is_known:
-            _log.warning("%s", reason)
+        else:
+            _log.warning(REASON, reason)
 
     def _check_open(self) -> None:
         if self._closed:

@@ -132,7 +132,10 @@ def override(part: _Part, values: Mapping[str, Any], where: str) -> _Part:
             raise ConfigError(f"{where}: {unknown_name('key', key, fields)}")
         before = VelocityEnvelope() if fields[key] is None else fields[key]  # not configured yet
         changes[key] = _convert(before, value, f"{where}: {key}")
-    return dataclasses.replace(part, **changes)  # type: ignore[type-var]
+    try:
+        return dataclasses.replace(part, **changes)  # type: ignore[type-var]
+    except ConfigError as error:
+        raise ConfigError(f"{where}: {error}") from None
 
 
 def _convert(current: object, value: object, where: str) -> object:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import zipfile
 from dataclasses import dataclass, fields, replace
+from importlib.metadata import entry_points
 from itertools import groupby, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,11 +18,15 @@ from jaxtyping import Bool, Float, Int
 
 from go2_wbc.brief import cut, inline_html
 from go2_wbc.errors import ConfigError, MissingDependency
-from go2_wbc.extras import install_line
+from go2_wbc.extras import EXTRAS, install_line
 from go2_wbc.files import checked_output, write_atomically
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.figure import Figure
+
+EXPORTS = {".mcap": "mcap", ".rrd": "rerun"}
+"""Files for other viewers, and the extra that each needs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +145,29 @@ class Recording:
                 columns |= {f"{name}{i}": column for i, column in enumerate(values.T)}
         return pandas.DataFrame(columns)
 
+    def export(self, path: Path | str) -> Path:
+        """Write it for other viewers: ``.mcap`` for Foxglove, ``.rrd`` for Rerun; gives its path.
+
+        Raises:
+            ConfigError: for another ending, a place that cannot be written to, or no sample.
+            MissingDependency: without the extra; says how to get it.
+        """
+        target = checked_output(path, list(EXPORTS))
+        return write_atomically(target, viewer(EXPORTS[target.suffix])(self._with_samples()))
+
+    def plot(self) -> Figure:
+        """Trunk, feet, and torques against a Go2's limits over time; needs no display.
+
+        Raises:
+            ConfigError: for a recording without a sample.
+        """
+        return viewer("plot")(self._with_samples())
+
+    def _with_samples(self) -> Recording:
+        if not len(self.time):
+            raise ConfigError("the recording has no sample")
+        return self
+
     def spans(self) -> tuple[Span, ...]:
         """Stretches of equal labels, in order; each ends where the next begins."""
         labels, time = self.labels, self.time - self.time[0]
@@ -148,6 +176,20 @@ class Recording:
             Span(float(time[start]), float(time[end]), labels[start])
             for start, end in pairwise([*starts, len(labels) - 1])
         )
+
+
+def viewer(name: str) -> Any:  # noqa: ANN401 - each makes something else of a recording
+    """What makes a plot, or the content of a file, of a recording: an entry point, as of ``viz``.
+
+    Raises:
+        MissingDependency: without the extra of this name; says how to get it.
+    """
+    entries = [*entry_points(group="go2_wbc.recording", name=name)]
+    try:
+        return entries[0].load()
+    except (ImportError, IndexError) as error:
+        line = install_line(name) if name in EXTRAS else "python -m pip install go2-wbc"
+        raise MissingDependency(f"{name} is not installed ({error}): {line}") from error
 
 
 _ARRAYS = tuple(field.name for field in fields(Recording))[:8]

@@ -5,8 +5,6 @@ repetitions in long loops are checked now and again only (see ``tests/typechecke
 ``GO2_WBC_TYPECHECK=0`` switches them off. pytest-xdist workers load this file too.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 from pathlib import Path
@@ -27,7 +25,6 @@ LONGEST = tuple(
         "test_notebooks.py",
         "controller/bridges/unitree/test_foreign_peers.py",
         "test_docs.py",
-        "test_site.py",
         "viz/replay/test_plan_browser.py",
         "viz/replay/test_live_browser.py",
         "viz/replay/test_browser.py",

@@ -3,8 +3,6 @@
 How a block is taken is said in ``tests/pages.py``.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import inspect
 import re

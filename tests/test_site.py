@@ -1,9 +1,6 @@
-"""The documentation builds without a warning and without network, and its links lead somewhere."""
-
-from __future__ import annotations
+"""The documentation needs no network, its links lead somewhere, and what it is made of."""
 
 import os
-import subprocess
 import sys
 from collections.abc import Mapping
 from html.parser import HTMLParser
@@ -25,6 +22,8 @@ from tests.viz.replay.browsing import chromium
 
 NEEDED = ("sphinx", "furo", "math_core", "myst_nb", "sphinx_copybutton")
 MISSING = [name for name in NEEDED if find_spec(name) is None]
+BUILT = os.environ.get("GO2_WBC_SITE")
+"""Where a build has just put the site."""
 IS_REQUIRED = os.environ.get("GO2_WBC_REQUIRE_DOCS") == "1"
 GRAPH = {
     "cli": {"loop", "robot", "errors"},
@@ -54,19 +53,9 @@ def extension(name: str) -> ModuleType:
 # --- the site ---------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-def test_the_site_builds_without_a_warning_and_its_links_lead_somewhere(tmp_path: Path) -> None:
-    """The command of ``make docs``, with nothing left from an earlier build."""
-    target = tmp_path / "html"
-    options = ["-W", "--keep-going", "-q", "-E"]
-    done = subprocess.run(
-        [sys.executable, "-m", "sphinx", *options, "docs", str(target)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+@pytest.mark.skipif(BUILT is None, reason="`make docs` builds the site, and runs this test on it")
+def test_the_links_of_the_site_lead_somewhere_and_its_pages_are_whole() -> None:
+    target = Path(BUILT or "").resolve()
     assert problems(target) == []
     pages = [file.relative_to(target) for file in target.rglob("*.html")]
     made = {file.with_suffix(".md").as_posix() for file in pages}

@@ -30,6 +30,7 @@ from go2_wbc.planning.ground import (
     carry_ground,
     ground_at,
     ground_below,
+    haste,
     learn_ground,
     level_friction,
     note_stumble,
@@ -120,7 +121,8 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
     """Ramp velocity and pose, integrate to the place, apply the leash, correct the height."""
     trunk, config = s.trunk, c.config
     advance_pose(trunk.pose, trunk.pose_rate, config.pose, command.pose, dt)
-    ramp(trunk.velocity, command, config.linear_acceleration, config.angular_acceleration, dt)
+    linear = haste(s.ground, s.slip.friction) * config.linear_acceleration
+    ramp(trunk.velocity, command, linear, config.angular_acceleration, dt)
     follow_heading(trunk, now, config.yaw_leash, dt)
     if s.is_stepping:
         follow_position(trunk, now, config.position_leash, dt)
@@ -226,7 +228,8 @@ def plan(
         foot, p = s.feet[leg].contact, now.p_world_feet[leg]
         above = p[2] - c.foot_radius - ground_at(s.ground, p[0], p[1])
         stands[leg] = follow_contact(foot, above, contact[leg], stance[leg], progress[leg], dt)
-    observe_slip(s.slip, now, contact, tau, stands, s.is_stepping, dt)
+    steps, beside = s.is_stepping, c.stands_beside_com
+    observe_slip(s.slip, now, contact, tau, stands, steps, beside, dt)
     note_liftoffs(now, s, c, contact, stance, progress)
     target.friction = level_friction(s.ground, s.slip.friction, LEAST_FRICTION)
     fill_body(s.trunk, s.ground, c.height, target)
@@ -246,12 +249,15 @@ class LocomotionPlanner:
         self._state, self._command = Planner(), Command()
         self.change_gait(gait)
 
-    def start(self, snapshot: Snapshot, friction: float | None = None) -> None:
+    def start(
+        self, snapshot: Snapshot, friction: float | None = None, has_slid: bool = True
+    ) -> None:
         """Begin from the measured state, standing.
 
         Args:
             snapshot: of this tick.
             friction: of the ground, as it is known; None if nothing is.
+            has_slid: whether a foot has shown that, and not only that it is at least as high.
         """
         known = self._config.ground_friction if friction is None else friction
         feet = [
@@ -266,7 +272,9 @@ class LocomotionPlanner:
             trunk=Trunk(yaw=snapshot.state.yaw, position=snapshot.p_world_com[:2]),
             rest=Rest(place=snapshot.p_world_com[:2], middle=snapshot.p_world_feet.mean(axis=0)),
             ground=ground_below(snapshot, self._model.foot_radius),
-            slip=Slip(friction=min(known, MOST_FRICTION)),
+            slip=Slip(
+                friction=min(known, MOST_FRICTION), has_slid=friction is not None and has_slid
+            ),
             feet=feet,
             planned=PlannedForces(next=-np.inf),
         )
@@ -305,6 +313,11 @@ class LocomotionPlanner:
     def friction(self) -> float:
         """Of the ground, as far as it has been shown; 0 before ``start``."""
         return float(self._state.slip.friction)
+
+    @property
+    def has_slid(self) -> bool:
+        """Whether a foot has, and has shown that friction."""
+        return bool(self._state.slip.has_slid)
 
     def square_up(self, snapshot: Snapshot) -> bool:
         """Start stepping unless every foot is below its hip; returns whether they all are."""

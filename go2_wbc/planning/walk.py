@@ -63,7 +63,8 @@ class LocomotionConfig:
         height: CoM height [m] above the ground.
         compression: by which feet under the trunk's weight are pressed flat, or into the ground,
             [m]: in MuJoCo 1 to 6 mm, by the friction of the joints.
-        linear_acceleration: greatest change of the commanded velocity [m/s^2].
+        linear_acceleration: greatest change of the commanded velocity [m/s^2] on a friction of
+            0.6, the most that is believed; on less it is as much less (``ground.haste``).
         angular_acceleration: greatest change of the commanded turning rate [rad/s^2].
         velocity_feedback: foothold offset [s] per velocity error.
         stride_margin: speed [m/s] that the robot may have beyond the commanded one before the
@@ -88,7 +89,7 @@ class LocomotionConfig:
 
     height: float = 0.29
     compression: float = 0.004
-    linear_acceleration: float = 1.5
+    linear_acceleration: float = 5.0
     angular_acceleration: float = 4.0
     velocity_feedback: float = 0.12
     stride_margin: float = 0.4
@@ -136,6 +137,7 @@ class Walk:
         gravity: [m/s^2].
         foot_radius: [m].
         p_base_feet_nominal: places of the feet below the hips, from the base [m].
+        stands_beside_com: whether at times only the feet of one side, or of one end, stand.
     """
 
     config: LocomotionConfig
@@ -145,6 +147,7 @@ class Walk:
     gravity: float
     foot_radius: float
     p_base_feet_nominal: Float[np.ndarray, "4 3"]
+    stands_beside_com: bool
 
     @staticmethod
     def of(model: RobotModel, gait: Gait, config: LocomotionConfig) -> Walk:
@@ -157,6 +160,7 @@ class Walk:
             model.gravity,
             model.foot_radius,
             model.p_base_feet_nominal,
+            gait.stands_beside_com,
         )
 
 

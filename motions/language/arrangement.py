@@ -156,7 +156,7 @@ class Arrangement(TimelineData):
         Raises:
             TimelineError: for a number below 1, another end than start, or too long a motion.
         """
-        if isinstance(times, bool) or not isinstance(times, int) or times < 1:
+        if not (is_number(times) and isinstance(times, int) and times >= 1):
             raise TimelineError(f"repeat() needs a whole number of 1 or more, got {times!r}")
         self._require_length(times * max(self.end, SHORTEST))
         return self.then(*[self] * (times - 1))

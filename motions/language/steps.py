@@ -175,11 +175,6 @@ def rhythm_within(gait: StepGait, rounds: int, over: float) -> Rhythm:
     return Rhythm(rounds, stepping / (rounds - 1.0 + gait.last), gait.rest, over)
 
 
-def least_time(gait: StepGait, rounds: int) -> float:
-    """Seconds of so many rounds at the fastest."""
-    return 2.0 * gait.rest + (rounds - 1.0 + gait.last) * gait.least_period
-
-
 def steps_of(way: Way, gait: StepGait, rhythm: Rhythm, start: float) -> Iterator[StepKey]:
     """The steps of a stretch that starts at ``start`` [s].
 
@@ -327,7 +322,7 @@ class Steps(TimelineData):
             start, next_beat = self._span(1.0)
             return rhythm_for(gait, rounds, next_beat - start if self.shift_beats else None)
         start, end = self._span(over)
-        least = least_time(gait, rounds)
+        least = 2.0 * gait.rest + (rounds - 1.0 + gait.last) * gait.least_period
         if end - start < least - SAME:
             hint = "" if name == "trot" else ', or try gait="trot"'
             raise TimelineError(

@@ -101,8 +101,8 @@ def _arrays_of(file: Path) -> dict[str, np.ndarray]:
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
-    except (*UNREADABLE, KeyError) as error:
-        raise MotionFileError(f"{file} is damaged, cut short, or no saved plan") from error
+    except (*UNREADABLE, KeyError):  # NumPy's advice would be to unpickle it: say nothing of that
+        raise MotionFileError(f"{file} is damaged, cut short, or no saved plan") from None
 
 
 def _require_sane(plan: CompiledPlan) -> None:

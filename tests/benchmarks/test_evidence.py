@@ -1,7 +1,5 @@
 """The evidence of the documentation comes from the benchmark, whole."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

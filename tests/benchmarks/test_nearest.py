@@ -1,7 +1,5 @@
 """The benchmark of nearest motions: what is refused, what is measured, a sample of its row."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """A robot in MuJoCo under a controller, which most tests of this folder ask for."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

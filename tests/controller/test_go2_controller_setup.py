@@ -1,7 +1,5 @@
 """What a controller is made of may be missing, broken or unknown: the error says what and why."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """From the check's report, and from a run, to what the viewers show."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

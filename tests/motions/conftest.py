@@ -1,7 +1,5 @@
 """What most tests of motions need: a robot, and what checks motions on one."""
 
-from __future__ import annotations
-
 import pytest
 
 from go2_wbc.robot.model import RobotModel

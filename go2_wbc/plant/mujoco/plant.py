@@ -21,7 +21,7 @@ from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN, bin_forces, read_joints
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
 from go2_wbc.plant.mujoco.pushes import Pushes
-from go2_wbc.plant.mujoco.settling import LYING_DAMPING, settle
+from go2_wbc.plant.mujoco.settling import settle
 from go2_wbc.plant.mujoco.setup import PlantSetup, SavedPhysics, prepare
 from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors, SensorNoise
 from go2_wbc.plant.terrain import Terrain
@@ -48,6 +48,8 @@ class MujocoPlant(Plant):
 
     Args:
         mjcf: a user's own MJCF or scene of it; ``None`` builds the model from the URDF.
+        keyframe: name of the one of ``mjcf`` that it starts in instead of lying: its joints are
+            held there until it rests. ``GO2Controller.take_over`` goes on from a stance.
         timestep: physics step [s]; overrides the one of ``mjcf``.
         control_period: seconds per ``write``, an integer multiple of ``timestep``.
         friction: sliding friction coefficient; ``None`` is 0.8, or what ``mjcf`` says. With
@@ -102,6 +104,7 @@ class MujocoPlant(Plant):
         robot: str = GO2,
         visuals: bool = False,
         delay: float = 0.0,
+        keyframe: str | None = None,
     ) -> None:
         if sensors not in SENSORS:
             raise ConfigError(unknown_name("sensors", sensors, SENSORS))
@@ -123,6 +126,7 @@ class MujocoPlant(Plant):
             visuals=visuals,
             delay=delay,
             seed=seed,
+            keyframe=keyframe,
         )
         start_rng, self._rng = np.random.default_rng(seed).spawn(2)
         # MuJoCo's warnings would otherwise go to a file in the working directory.
@@ -146,12 +150,12 @@ class MujocoPlant(Plant):
         self._R_world_base = data.xmat[layout.base].reshape(3, 3)
         self._warnings = data.warning.number
         self._bind_kernels()
-        settle(self._model, data, layout, setup, start_rng)
-        # One period in the lying state, so that the first read has forces and torques.
+        resting = settle(self._model, data, layout, setup, start_rng)
+        # One period in the resting state, so that the first read has forces and torques.
         self._senses: Proprioception | None = None
         self._state: RobotState | None = None
         self._imu: ImuSample | None = None
-        self.write(JointCommand.damping(LYING_DAMPING))
+        self.write(resting)
         self._ticks, self._data.time = 0, 0.0
         if sensors == "imu":
             errors = errors or SensorErrors()

@@ -1,7 +1,5 @@
 """Solved once for all tests: a jump, a rear and a lift, each a second of processor time."""
 
-from __future__ import annotations
-
 import pytest
 
 from go2_wbc.legs import Leg

@@ -1,7 +1,5 @@
 """The replay page in a real Chromium, from a file, offline."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Literal
 

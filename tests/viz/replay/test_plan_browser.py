@@ -1,7 +1,5 @@
 """A page with verdict and ghost in a real Chromium: findings in red, jumps, margins, the ghost."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from dataclasses import replace
