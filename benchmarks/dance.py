@@ -5,8 +5,6 @@ to a file and found again: what is judged is the whole way from the file to the 
 finder and the lead of the choreography were tuned on songs with seeds below 100.
 """
 
-from __future__ import annotations
-
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
