@@ -91,7 +91,7 @@ def run(
         go2-wbc run my_motion.py --friction 0.5 --sensors imu --seed 3
         go2-wbc run my_motion.py --force    although the check says no
         go2-wbc run wave --viewer --video wave.webp --export wave.mcap
-        go2-wbc run wave --mjcf yard.xml --keyframe floor    after: go2-wbc new yard --scene
+        go2-wbc run wave --mjcf yard.xml --keyframe ramp    of `new yard --scene`
     """
     from controller.arguments import config as read_config
     from controller.motion_measurement import measure_motion
