@@ -77,11 +77,6 @@ CAUSES: dict[str, tuple[Write, tuple[float, ...], str, tuple[float, ...]]] = {
 others, and these, which physics does not do."""
 
 
-@pytest.fixture(scope="module")
-def checker() -> FeasibilityChecker:
-    return FeasibilityChecker()
-
-
 @pytest.mark.parametrize(
     ("name", "size"),
     [(name, size) for name, (_, done, _, wrong) in CAUSES.items() for size in (*done, *wrong)],
