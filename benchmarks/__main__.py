@@ -13,7 +13,6 @@ COMMANDS: tuple[Command, ...] = (
     Command("feasibility", "benchmarks.feasibility", "the feasibility check against physics"),
     Command("bridges", "benchmarks.bridges.command", "ROS 2 and Unitree's protocol, by processes"),
     Command("qp_infeasibility", "benchmarks.qp_infeasibility", "the QP that contradicts itself"),
-    Command("steps", "benchmarks.steps", "where authored steps and walks end"),
     Command("locomotion", "benchmarks.locomotion", "gaits at their speeds"),
     Command("envelopes", "benchmarks.envelopes", "the greatest speed of each gait, and store it"),
     Command("balance", "benchmarks.balance", "pushes, drops, gait changes; falls noticed"),
@@ -40,6 +39,7 @@ GONE = {
     "dynamics": "`nearest` measures what planning takes, commit 55f699b has the program",
     "dynamic_motions": "`feasibility --rows dynamic` plays solved motions, and more of them",
     "false_negatives": "docs/feasibility.md has its results, commit 404d8b9 its program",
+    "steps": "docs/motions.md has its results, commit 404d8b9 its program",
     "sweeps": "commit 55f699b has the program",
 }
 """What is no command any more, and where it is."""

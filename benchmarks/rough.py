@@ -150,6 +150,7 @@ def _walked(robot: TrialRobot, speed: float, length: float) -> float:
     start, course = plant.truth(), plant.read().yaw
     most, side = PATIENCE + length / (LEAST_SHARE * abs(speed)), math.copysign(1.0, speed)
     ahead = side * np.array([math.cos(start.yaw), math.sin(start.yaw)])
+    way = 0.0
     while (elapsed := plant.time - start.time) <= most:
         go2.move(speed, STEER * wrap_angle(course - plant.read().yaw))
         robot.wait(LOOK)

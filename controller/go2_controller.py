@@ -48,7 +48,8 @@ class GO2Controller:
     background thread at wall-clock pace.
 
     A blocking call returns True only when the measured state shows that the thing was done;
-    otherwise False, with the reason in ``last_outcome``.
+    otherwise False, with the reason in ``last_outcome``. It raises ModeError after a fall or while
+    another one runs, and all raise ClosedError once the robot is closed.
 
     Example:
         >>> with GO2Controller() as go2:
@@ -77,8 +78,7 @@ class GO2Controller:
             realtime: let the robot live at wall-clock pace in a background thread.
             viewer: open MuJoCo's viewer if there is a display.
             config: numbers of the engine, or a TOML file that overrides some.
-            robot: name of its profile: "go2", "a1" or "go1"; by default that of the plant or the
-                configuration.
+            robot: "go2", "a1" or "go1"; by default that of the plant or the configuration.
             urdf: another URDF of the robot instead of the installed one: what the controller takes
                 the robot for. Without ``plant`` the simulated robot is built from it, too.
             after_tick: is called after every control period, in the thread that ticks.
@@ -89,8 +89,7 @@ class GO2Controller:
             ConfigError: for a namespace, configuration or task that is not valid, or without
                 ``realtime`` for a plant that needs it.
             SolverUnavailable: if the configured QP solver is unknown or not installed.
-            DescriptionError: if the robot's files are missing, broken, or not such a
-                robot's.
+            DescriptionError: if the robot's files are missing, broken, or another robot's.
             PlantError: if the plant does not answer.
         """
         self._namespace = arguments.namespace(namespace)
@@ -104,10 +103,7 @@ class GO2Controller:
         with ExitStack() as opened:
             if plant is None:
                 plant = MujocoPlant(
-                    urdf=urdf,
-                    robot=config.robot,
-                    visuals=viewer,
-                    motor=config.motor,
+                    urdf=urdf, robot=config.robot, visuals=viewer, motor=config.motor
                 )
                 opened.callback(plant.close)
             self._plant = plant
@@ -222,12 +218,19 @@ class GO2Controller:
         """Turn left in place by ``angle`` [rad], measured on the heading; negative turns right.
 
         Ends at rest in walking mode.
+
+        Raises:
+            CommandError: for what is no finite number, or looks like degrees.
         """
         angle = finite_number("angle", angle)
         return self._call("turn_left", lambda: self._pilot.run_goal(TurnInPlace(angle)))
 
     def turn_right(self, angle: float) -> bool:
-        """Turn right in place by ``angle`` [rad], measured on the heading."""
+        """Turn right in place by ``angle`` [rad], measured on the heading.
+
+        Raises:
+            CommandError: as ``turn_left``.
+        """
         angle = finite_number("angle", angle)
         return self._call("turn_right", lambda: self._pilot.run_goal(TurnInPlace(-angle)))
 
@@ -235,6 +238,9 @@ class GO2Controller:
         """Walk ``distance`` [m] straight ahead, measured; negative is backward.
 
         Ends at rest in walking mode.
+
+        Raises:
+            CommandError: for what is no finite number.
         """
         distance = finite_number("distance", distance)
         return self._call("move_forward", lambda: self._pilot.run_goal(DriveStraight(distance)))
@@ -285,8 +291,7 @@ class GO2Controller:
                 motions with flight or on fewer than three feet. Simulated ones always do.
 
         Raises:
-            CommandError: for an unknown name; lists the valid ones. Also for what is no motion, or
-                a number of times that is no whole number of 1 or more.
+            CommandError: for an unknown name, what is no motion, or ``times`` below 1.
             TimelineError: for an empty timeline.
             MotionFileError: for a file that cannot be used.
             DynamicMotionRefused: for a dynamic motion on hardware without ``allow_dynamic``.
@@ -341,7 +346,11 @@ class GO2Controller:
         return motions.FeasibilityChecker(model, self._limits)
 
     def wait(self, seconds: float) -> None:
-        """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""
+        """Let ``seconds`` of robot time pass; the robot goes on doing what it does.
+
+        Raises:
+            CommandError: for what is no finite number of 0 or more.
+        """
         self._check_open()
         if (seconds := finite_number("seconds", seconds)) < 0.0:
             raise CommandError(f"seconds must not be negative, got {seconds}")
@@ -431,16 +440,7 @@ class GO2Controller:
     ) -> bool:
         """Run ``procedure`` to its end, one at a time in all threads; returns whether it was done.
 
-        Whatever ends it is noted. An error that is not of this project, Ctrl-C included, leaves the
-        robot limp.
-
-        Args:
-            name: of the call.
-            procedure: measures what it has done, or raises ``Aborted``.
-            allow_fallen: whether a robot that has fallen may be asked.
-
-        Raises:
-            ModeError: while another call runs, or for a robot that has fallen.
+        Its end is noted. An error that is not of this project, or Ctrl-C, leaves the robot limp.
         """
         self._check_open()
         if self._pilot.mode is Mode.FALLEN and not allow_fallen:

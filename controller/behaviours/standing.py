@@ -163,7 +163,6 @@ def must_step(snapshot: Snapshot, offset: tuple[float, float]) -> bool:
     """Whether a robot that is up cannot come to rest above its feet.
 
     Args:
-        snapshot: of this tick.
         offset: place [m] of the capture point in the world, from the feet's middle.
     """
     if hypot(*offset) < WELL_INSIDE:

@@ -6,8 +6,7 @@ and v that of the IMU by the feet that stand, weighted by what they bear, all in
     gyro            d/dt (p_i - p_j) + w x (p_i - p_j) = 0    least squares over time
     accelerometer   d/dt s = a - w x s - R'g + (v - s) / T    (s - v) / T is its error
 
-Feet that slip do not turn together: an error of the gyro has to explain their residual, or to come
-with one of the accelerometer: feet seem to move otherwise, and soon gravity lies wrong. Where the
+Feet that slip do not turn together: an error of the gyro has to explain their residual. Where the
 gyro jumps from one reading to the next, whether the feet jump along is known at once, and of an
 error then all of it, also about the line between two feet of a trot. s is the
 velocity that the accelerometer integrates to, drawn to the feet's; between two steps nothing draws
@@ -49,8 +48,6 @@ not jump along have to show of it [m^2/s^2], for how long at least [s], and at m
 JUMP_SHARE, NO_JUMP, JUMP_EXPLAINED = (0.7, 1.4), 0.5, 0.7
 """Range of the share of the jump that they lack, if it is an error; share below which it is none;
 and the share of their squared residual that an error explains: 0.75 to 0.99, others 0.6 at most."""
-WITH_FORCE = 0.16
-"""Time [s] after which an error of the accelerometer speaks for one of the gyro, if it has one."""
 UNSEEN = 0.5
 """m^2 that is added to what feet tell of each axis of the gyro's error, and draws it towards 0: two
 feet tell nothing of a turn about the line between them. A pair adds 0.1 to 0.25 in each tick."""
@@ -59,6 +56,12 @@ FINER = 1.0 / 3.0
 FORCE_LIMIT, FORCE_LASTS, STAYING = 0.45, 0.25, 0.62
 """Error of the accelerometer [m/s^2] that is named, if it lasts so long [s] without falling below
 this share of what it was: what a blow leaves fades."""
+UPWARDS, UPWARDS_LASTS = 0.85, 0.14
+"""Share of it by which it points up or down, and how long [s] it lasts then: feet slide sideways,
+and a trot that believes it rises falls soon."""
+PUSHED = 0.6
+"""Share of it by which the legs push the robot sideways, as they do if all feet slide together:
+what the accelerometer feels then is true."""
 
 TILTED, TILT_LASTS, TILT_SHARE = 2.0, 0.1, 0.7
 """Once the gyro has erred, an error of the accelerometer is a tilt that it has left: taken back
@@ -82,6 +85,7 @@ class WatchedImu(Record):
         speed: of the IMU by the accelerometer, drawn to that by the feet [m/s].
         excess, most_excess: error of the accelerometer, smoothed once more, and the greatest while
             there is one [m/s^2].
+        push: by which the legs push, smoothed [m/s^2].
         force_off, force_time: the same as of the gyro, of the accelerometer [m/s^2].
         turn: by which the gyro has turned whoever believed it until now [rad].
         gyro_is_off, force_is_off: 1 for what is broken.
@@ -105,6 +109,7 @@ class WatchedImu(Record):
     speed: Array3
     excess: Array3
     most_excess: float
+    push: Array3
     force_off: Array3
     force_time: float
     turn: Array3
@@ -123,6 +128,13 @@ def note_bearing(m: WatchedImu, is_calm: bool, is_borne: bool, dt: float) -> Non
         m.stood += dt
     keep = 1.0 if m.refining > 0.0 else np.exp(-dt / SETTLING)
     forget_turns(m, keep if m.stood >= CALM else 0.0)
+
+
+@subroutine
+def note_push(m: WatchedImu, push: V3, dt: float) -> None:
+    """Smooth what the legs push by, sum f / m."""
+    for k in range(3):
+        m.push[k] += dt / SETTLING * (push[k] - m.push[k])
 
 
 @subroutine
@@ -186,10 +198,10 @@ def judge_gyro(m: WatchedImu, dt: float) -> None:
         return
     explained = dot(error, triple(m.turned))
     most = UNEXPLAINED**2 * (m.turning[0, 0] + m.turning[1, 1] + m.turning[2, 2])
-    is_large = dot(error, error) > GYRO_LIMIT**2 and m.residual - explained < most
-    is_off = is_large and explained > EXPLAINED * m.residual
+    is_off = explained > max(EXPLAINED * m.residual, m.residual - most)
+    is_off = is_off and dot(error, error) > GYRO_LIMIT**2
     m.gyro_time = m.gyro_time + dt if is_off else 0.0
-    if m.gyro_time > GYRO_LASTS or (is_large and m.force_time > WITH_FORCE):
+    if m.gyro_time > GYRO_LASTS:
         m.gyro_is_off, m.refining = 1.0, REFINING
         share = 1.0 / FOUND_SHARE
         take_off(m, (share * error[0], share * error[1], share * error[2]), FOUND_AFTER)
@@ -246,13 +258,18 @@ def judge_accelerometer(
         put(v, s)
         m.excess[:] = 0.0
     is_fine = m.since < TILTED if is_tilt else m.force_is_off > 0.0
-    amount = np.sqrt(dot(triple(m.excess), triple(m.excess)))
+    excess, push = triple(m.excess), triple(m.push)
+    amount, rise = np.sqrt(dot(excess, excess)), dot(excess, up)
+    is_upwards = abs(rise) > UPWARDS * amount
+    sideways = dot(push, excess) - rise * dot(push, up)
+    is_pushed = sideways > PUSHED * (amount**2 - rise**2)
     if amount < max(FORCE_LIMIT * (FINER if is_fine else 1.0), STAYING * m.most_excess):
         m.force_time = m.most_excess = 0.0
-    elif stands:
+    elif stands and (is_tilt or is_upwards or not is_pushed):
         m.force_time += dt
         m.most_excess = max(m.most_excess, amount)
-    if m.force_time > (TILT_LASTS if is_tilt else FORCE_LASTS) and m.gyro_time == 0.0:
+    lasts = TILT_LASTS if is_tilt else UPWARDS_LASTS if is_upwards else FORCE_LASTS
+    if m.force_time > lasts and m.gyro_time == 0.0:
         m.force_time, m.is_found = 0.0, 1.0
         if is_tilt:
             by = cross(up, triple(m.excess))

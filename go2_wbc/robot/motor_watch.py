@@ -20,7 +20,7 @@ from go2_wbc.robot.state import JointCommand, PartFault, RobotState
 
 SETTLING = 0.1
 """Time constant [s] of the sums."""
-ASKED = 0.25
+ASKED = 0.06
 """Root mean square [N m] of what is asked, from which on a motor is judged."""
 NOISY_SPEED = 0.5
 """Error [rad/s] of a joint's speed that is read with noise: times the damping gain, torque that

@@ -4,7 +4,7 @@ Every reading passes here before the estimator. One that contradicts the others 
 named, and put right where they tell what it should have been. The residuals:
 
     encoder jumps    q - q_last - v dt                            the jump is taken off from then on
-    encoder stuck    q and v stay while the leg's others turn     nothing replaces it
+    encoder stuck    q and v stay while the leg's others do not   nothing replaces it
     foot's force     against f = -J^-T (tau - M dv/dt)            replaced by f
     IMU              against feet that stand: ``imu_watch``       the error is taken off
 
@@ -35,6 +35,7 @@ from go2_wbc.robot.imu_watch import (
     judge_gyro,
     judge_jump,
     note_bearing,
+    note_push,
     note_turn,
 )
 from go2_wbc.robot.leg_kinematics import LegGeometry, Legs, leg_table
@@ -47,9 +48,9 @@ LONGEST_STEP, USUAL_STEP = 0.05, 0.002
 """Time [s] between two readings of one stretch, and that taken for the first one's."""
 DOUBT = 0.01
 """Time [s] after which a joint that reads the very same says nothing of the IMU."""
-STUCK_TIME, STUCK_TRAVEL = 0.1, 0.03
-"""An encoder is stuck if it has read the very same for so long [s], while the other joints of its
-leg have turned so far [rad]."""
+STUCK_TIME = 0.1
+"""An encoder is stuck if it has read the very same for so long [s], while its leg's others have
+changed: noise alone lets none stay for more than 8 ms, not even at rest."""
 SMOOTHING = 0.008
 """Time constant [s] of the joints' accelerations."""
 LOADED, FREE = 20.0, 10.0
@@ -85,7 +86,6 @@ class WatchedSensors(Record):
         shift: what is taken off the angles [rad].
         dv: smoothed accelerations of the joints [rad/s^2].
         same: for how long a joint has read the very same [s].
-        travel: how far the other joints of its leg have turned since [rad].
         force, rise: the last of each foot [N], as it was read, and its last change.
         noise: of it, while it is free and while it stands; see ``NOISY`` [N].
         force_same: for how long it has been the very same [s].
@@ -105,7 +105,6 @@ class WatchedSensors(Record):
     shift: Array12
     dv: Array12
     same: Array12
-    travel: Array12
     force: Array4
     rise: Array4
     noise: Float[np.ndarray, "2 4"]
@@ -183,15 +182,13 @@ def watch_encoders(s: WatchedSensors, r: SensorReading, dt: float) -> None:
     s.whole = s.whole + 1.0 if dt < 1.5 * s.step else 0.0
     s.step = dt
     for j in range(12):
-        first, turned = 3 * (j // 3), 0.0
+        is_same = r.q_joints[j] == s.q[j] and r.v_joints[j] == s.v[j]
+        s.same[j] = s.same[j] + dt if is_same else 0.0
+    for j in range(12):
+        first, others = 3 * (j // 3), 0.0
         for k in range(first, first + 3):
-            turned += abs(r.q_joints[k] - s.q[k]) if k != j else 0.0
-        if r.q_joints[j] == s.q[j] and r.v_joints[j] == s.v[j]:
-            s.same[j] += dt
-            s.travel[j] += turned
-        else:
-            s.same[j], s.travel[j] = 0.0, 0.0
-        if s.same[j] > STUCK_TIME and s.travel[j] > STUCK_TRAVEL:
+            others = max(others, s.same[k]) if k != j else others
+        if s.same[j] > STUCK_TIME and others < DOUBT:
             s.stuck[j] = 1.0
     for j in range(12):
         jump = r.q_joints[j] - s.q[j] - 0.5 * (r.v_joints[j] + s.v[j]) * dt
@@ -299,6 +296,7 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
     w = triple(r.gyro)
     places, speeds = np.empty((4, 3)), np.empty((4, 3))
     borne, slack, loads = np.empty(4), np.empty(4), np.empty(4)
+    push, per_mass = (0.0, 0.0, 0.0), c.gravity / c.weight
     for leg in range(4):
         j = slice(3 * leg, 3 * leg + 3)
         q, v = triple(r.q_joints[j]), triple(r.v_joints[j])
@@ -306,8 +304,9 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
         place, u, force, slack[leg] = leg_motion(c.legs.geometry[leg], q, v, tau)
         put(place, places[leg])
         put(less_rolling(q, v, u, w, up, c.foot_radius), speeds[leg])
-        borne[leg] = force[2]
+        borne[leg], push = force[2], plus_scaled(push, per_mass, force)
     moved = plus_scaled(triple(r.accelerometer), -c.gravity, up)
+    note_push(m, push, dt)
     is_up = up[2] > UPRIGHT
     is_borne = is_up and borne.sum() > CARRIED * c.weight
     note_bearing(m, is_up and dot(moved, moved) < THROWN**2, is_borne, dt)
@@ -461,7 +460,7 @@ class SensorWatch:
 _OF_READING = tuple(slice(first, last) for first, last in pairwise((1, 4, 7, 19, 31, 43, 47)))
 """Where the arrays of a reading stand in its row."""
 _PARTS = (
-    *((name, "reads the same while its leg moves", False) for name in JOINT_NAMES),
+    *((name, "reads the same while its leg's others change", False) for name in JOINT_NAMES),
     *((name, "reads another angle than it turned to", True) for name in JOINT_NAMES),
     *((name, "feels another force than its leg bears", True) for name in FOOT_NAMES),
     ("gyro", "turns otherwise than the feet that stand", True),

@@ -222,6 +222,9 @@ class Steps(TimelineData):
             yaw: angle [rad] by which it also goes round the middle of the four feet.
             over: how long the foot is in the air.
             height: of the foot [m] in the middle of its way.
+
+        Raises:
+            TimelineError: for an unknown or raised foot, or a wrong value.
         """
         which = arguments.foot(leg)
         if which in self.raised:
@@ -249,6 +252,9 @@ class Steps(TimelineData):
             turn: angle [rad] by which the heading has turned then, to the left.
             over: how long it takes; by default as long as the gait needs. Alone, steps on the spot.
             gait: ``"walk"``, one foot after the other, or ``"trot"``, pairs across.
+
+        Raises:
+            TimelineError: for no way to go, an unknown gait, a raised foot, or a wrong value.
         """
         goal = [quantity(name, v, FARTHEST_WALK) for name, v in (("x", x), ("y", y))]
         goal.append(quantity("turn", turn))
@@ -260,11 +266,19 @@ class Steps(TimelineData):
         return self._stepped("walk()", Way(shares * np.array(goal)), over, gait)
 
     def turn(self, angle: float, over: float | None = None, *, gait: str = "walk") -> Self:
-        """Turn on the spot by ``angle`` [rad], to the left; see ``walk``."""
+        """Turn on the spot by ``angle`` [rad], to the left; see ``walk``.
+
+        Raises:
+            TimelineError: as ``walk``.
+        """
         return self.walk(turn=angle, over=over, gait=gait)
 
     def side_step(self, y: float, over: float | None = None, *, gait: str = "walk") -> Self:
-        """Go aside by ``y`` [m], to the left; see ``walk``."""
+        """Go aside by ``y`` [m], to the left; see ``walk``.
+
+        Raises:
+            TimelineError: as ``walk``.
+        """
         return self.walk(y=y, over=over, gait=gait)
 
     def path(
@@ -281,6 +295,9 @@ class Steps(TimelineData):
                 it goes; or (x, y, turn) with the angle [rad] by which it has turned there.
             over: how long it takes.
             gait: as for ``walk``.
+
+        Raises:
+            TimelineError: for an unknown gait, a raised foot, or a point twice in a row.
         """
         return self._stepped("path()", _way_through(points), over, gait)
 

@@ -22,11 +22,12 @@ _BAR = 0.035  # height of a foot's bar below the panel, as a share of the panel'
 def recording_figure(recording: Recording) -> Figure:
     """Height, attitude and velocity of the trunk, forces of the feet, torques over limits.
 
-    Of a leg the torque is that of the joint that is nearest its limit, a Go2's.
+    Of a leg the torque is that of the joint that is nearest its limit.
     """
     time, legs = recording.time - recording.time[0], [leg.name for leg in LEGS]
     attitude = np.degrees([rpy_from_quaternion(q)[:2] for q in recording.q[:, 3:7]])
-    torque = np.abs(recording.tau / find_description().efforts).reshape(-1, 4, 3).max(axis=2)
+    most = find_description(None, recording.robot).efforts
+    torque = np.abs(recording.tau / most).reshape(-1, 4, 3).max(axis=2)
     rows = (
         ("height of the base [m]", recording.q[:, 2:3], ["z"], _COLORS),
         ("attitude [deg]", attitude, ["roll", "pitch"], _COLORS),

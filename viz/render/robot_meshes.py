@@ -140,7 +140,9 @@ def _as_in_mjcf(path: str, empty: RobotVisuals) -> RobotVisuals:
     for k, shape in enumerate(shapes):
         joint = empty.model.getJointId(shape.joint) if shape.joint else 1
         place = data.oMi[joint].inverse() * pin.SE3(shape.T_base_shape)
-        item = pin.GeometryObject(f"shape{k}", joint, 0, place, coal.Sphere(0.0), shape.mesh)
+        link = shape.link if empty.model.existFrame(shape.link) else empty.model.names[joint]
+        frame = empty.model.getFrameId(link)
+        item = pin.GeometryObject(f"shape{k}", joint, frame, place, coal.Sphere(0.0), shape.mesh)
         empty.geometry.addGeometryObject(item)
     looks = {name: _surfaces([part]) for name, part in meshes.items()}
     return _slender(replace(empty, meshes=looks))

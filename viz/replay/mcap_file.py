@@ -17,7 +17,7 @@ from mcap.writer import Writer
 
 from go2_wbc.legs import JOINT_NAMES, LEGS
 from go2_wbc.recording import Recording
-from go2_wbc.robot.model import RobotModel
+from viz.render.robot_meshes import visuals_of
 from viz.replay.links import BASE, WORLD, label_starts, links_of
 
 DIGITS = 6
@@ -40,7 +40,7 @@ def mcap_of(recording: Recording) -> bytes:
         writer.add_message(channels[topic], time, json.dumps(message).encode(), time)
 
     times, starts = np.rint(1e9 * recording.time).astype(int).tolist(), label_starts(recording)
-    links = links_of(RobotModel().pin_model, recording.q)
+    links = links_of(visuals_of(recording).model, recording.q)
     for row, time in enumerate(times):
         stamp: Mapping[str, Any] = {"sec": time // 10**9, "nsec": time % 10**9}
         transforms = [

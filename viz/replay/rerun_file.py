@@ -13,7 +13,7 @@ import rerun as rr
 from go2_wbc.legs import JOINT_NAMES, LEGS
 from go2_wbc.recording import Recording
 from viz.render.mesh import Surface
-from viz.render.robot_meshes import load_robot_visuals
+from viz.render.robot_meshes import visuals_of
 from viz.replay.links import WORLD, label_starts, links_of
 
 APPLICATION, TIMELINE = "go2_wbc", "time"
@@ -26,7 +26,7 @@ def rrd_of(recording: Recording) -> bytes:
     stream = rr.RecordingStream(APPLICATION)
     memory = stream.memory_recording()
     times = [rr.TimeColumn(TIMELINE, duration=recording.time)]
-    visuals = load_robot_visuals()
+    visuals = visuals_of(recording)
     stream.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     paths = [WORLD]
     for link in links_of(visuals.model, recording.q):

@@ -74,6 +74,7 @@ class MujocoPlant(Plant):
         delay: time [s] after which a command acts, rounded to whole control periods.
 
     Raises:
+        ClosedError: from all calls, once it is closed.
         ConfigError: for a value that is out of range.
         ModelMismatch: if ``mjcf`` cannot be read or lacks something; names all of it.
         DescriptionError: if the robot's files are missing or broken.

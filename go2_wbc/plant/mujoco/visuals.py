@@ -85,11 +85,13 @@ class DrawnShape(NamedTuple):
 
     Attributes:
         joint: that moves it; empty for the trunk.
+        link: name of its body.
         mesh: name of its mesh.
         T_base_shape: its pose in the base frame when all joints are at 0.
     """
 
     joint: str
+    link: str
     mesh: str
     T_base_shape: Float[np.ndarray, "4 4"]
 
@@ -115,6 +117,7 @@ def drawn_shapes(mjcf: Path | str) -> tuple[dict[str, MeshPart], list[DrawnShape
         body, rgba = model.geom_bodyid[geom], _rgba(model, geom)
         if model.body_rootid[body] != base or model.geom_group[geom] > VISUAL_GROUP or not rgba[3]:
             continue
+        link = model.body(body).name
         while body not in joints and body != base:
             body = model.body_parentid[body]
         found = _shape(model, geom, rgba)
@@ -123,7 +126,7 @@ def drawn_shapes(mjcf: Path | str) -> tuple[dict[str, MeshPart], list[DrawnShape
             meshes.setdefault(name, part)
             T_world_shape = _pose(data.geom_xpos[geom], data.geom_xmat[geom])
             T_base_shape = np.linalg.solve(T_world_base, T_world_shape)
-            shapes.append(DrawnShape(joints.get(body, ""), name, T_base_shape))
+            shapes.append(DrawnShape(joints.get(body, ""), link, name, T_base_shape))
     if not shapes:
         raise DescriptionError(f"{mjcf} shows nothing of the robot: no shape in groups 0 to 2")
     return meshes, shapes

@@ -113,7 +113,8 @@ def test_the_scene_tree_moves_every_link_as_pinocchio_does(page: str, seed: int)
         if command["type"] == "set_object" and "/robot/" in command["path"]
     ]
     for item in visuals.geometry.geometryObjects:
-        node = next(node for node in nodes if node.endswith(f"/{item.name}_0"))
+        link = visuals.model.frames[item.parentFrame].name
+        node = next(node for node in nodes if node.endswith(f"/{link}_0"))
         T_world_visual = data.oMi[item.parentJoint] * item.placement
         np.testing.assert_allclose(
             placement(header, node, q), T_world_visual.homogeneous, atol=1e-9

@@ -1,12 +1,14 @@
 "use strict";
 // Flat drawings over time: the label strip, the contact strip and the curves.
 
-const INK = "#1f2937", MUTED = "#6b7280", LINE = "#e3e8f0", ACCENT = "#2563eb", BAD = "#dc2626";
+const [INK, MUTED, LINE, SOFT, ACCENT, BAD] = ["ink", "muted", "line", "soft", "accent", "bad"].map(css);
 const FONT = "Inter, system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
 const WARN = "#f59e0b", GHOST = "#7c93d6", WRITTEN = "#a8713a";
 const BEAT_ROOM = 7; // px, least distance of two lines of the beats
 const LANE = 9; // px, height of the strip that shows when limits are broken
-const LABEL_COLORS = ["#dbe6ff", "#fde9cf", "#d5f2e3", "#fbdcea", "#e6e0fb", "#d7eff5"];
+const LABEL_COLORS = IS_DARK.matches
+  ? ["#2c3f6e", "#5a4320", "#1f4d3a", "#5a2c43", "#41356f", "#224b56"]
+  : ["#dbe6ff", "#fde9cf", "#d5f2e3", "#fbdcea", "#e6e0fb", "#d7eff5"];
 
 // A canvas with a picture that is drawn once per size, and a cursor drawn over it.
 class TimeCanvas {
@@ -129,7 +131,7 @@ class Timeline extends TimeCanvas {
   // When limits are nearly broken (amber) and broken (red).
   drawAnnotations(paint, top) {
     if (!this.data.annotations.length) return;
-    paint.fillStyle = "#f3f5f9";
+    paint.fillStyle = SOFT;
     paint.fillRect(this.left, top, this.width - this.left - this.right, LANE);
     const sorted = [...this.data.annotations].sort((a, b) => a.is_broken - b.is_broken);
     for (const { is_broken: isBroken, spans } of sorted) {
@@ -150,12 +152,12 @@ class Timeline extends TimeCanvas {
   drawLeg(paint, leg, k, top, height) {
     const { data } = this;
     const color = data.header.leg_colors[k];
-    paint.fillStyle = color;
+    paint.fillStyle = IS_DARK.matches ? INK : color;
     paint.font = `700 11px ${FONT}`;
     paint.textAlign = "left";
     paint.textBaseline = "middle";
     paint.fillText(leg, 4, top + height / 2 + 0.5);
-    paint.fillStyle = "#f3f5f9";
+    paint.fillStyle = SOFT;
     paint.fillRect(this.left, top, this.width - this.left - this.right, height);
     const half = 0.5 / data.rate;
     paint.globalAlpha = 0.22;
