@@ -22,9 +22,9 @@ SETTLING = 0.1
 """Time constant [s] of the sums."""
 ASKED = 0.06
 """Root mean square [N m] of what is asked, from which on a motor is judged."""
-NOISY_SPEED = 0.5
-"""Error [rad/s] of a joint's speed that is read with noise: times the damping gain, torque that
-seems to be asked for. Of a robot with noisy sensors six sound motors were named as it stood up."""
+NOISY_SPEED = 1.0
+"""Error [rad/s] of a joint's speed, read with noise or changed within a tick by a push: times the
+damping gain, torque that seems to be asked for. Of 0.5 sound motors were named in `recover`."""
 WEAK, DEAD = 0.65, 0.42
 """Share below which it is broken, and below which it is dead: of one that has just died so much is
 left in the sums when it is named, and half a torque is half a torque."""
