@@ -1,7 +1,5 @@
 """``python -m benchmarks NAME``: runs one benchmark."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """The command line finds its commands, and every way to fail has its message and exit code."""
 
-from __future__ import annotations
-
 import logging
 import os
 import shlex

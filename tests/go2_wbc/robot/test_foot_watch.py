@@ -1,7 +1,5 @@
 """A foot that is held in the air is named, unless it touches something or all is upset."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
