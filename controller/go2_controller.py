@@ -461,7 +461,7 @@ class GO2Controller:
                 self._pilot.collapse(reason)
                 reason = f"{reason}, damped"
             finally:
-                self._note(call, reason)
+                self._note(call, Outcome(False, reason))
             raise
         finally:  # no function is called in here: Python looks for Ctrl-C when one returns
             if "call" in self._turn and self._turn["call"] is call:
@@ -473,28 +473,21 @@ class GO2Controller:
             self._pilot.begin()
             measured = procedure()
         except Aborted as aborted:
-            self._note(call, str(aborted), aborted.measured)
+            self._note(call, Outcome(False, str(aborted), measured=aborted.measured))
             return False
         except Go2WbcError as error:
-            self._note(call, str(error), is_raised=True)
+            self._note(call, Outcome(False, str(error)), is_raised=True)
             raise
-        self._note(call, "done", measured, ok=True)
+        self._note(call, Outcome(True, "done", measured=dict(measured)))
         return True
 
-    def _note(
-        self,
-        call: _Call,
-        reason: str,
-        measured: Measurements | None = None,
-        *,
-        ok: bool = False,
-        is_raised: bool = False,
-    ) -> None:
+    def _note(self, call: _Call, outcome: Outcome, *, is_raised: bool = False) -> None:
         """What came of ``call``, and which parts are broken that the reason does not name."""
+        ok, reason = outcome.ok, outcome.reason
         if untold := [str(f) for f in self.health.faults if str(f) not in reason]:
             reason = "; ".join([reason, *untold])
         duration = self._runner.loop.state.time - call.start
-        self._last = Outcome(ok, reason, duration, dict(measured or {}))
+        self._last = replace(outcome, reason=reason, duration=duration)
         fault = self._runner.loop.fault
         is_told = is_raised or (fault is not None and fault.reason in reason)  # logged by the loop
         if ok or is_told:

@@ -13,7 +13,12 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 
+import controller
+import go2_wbc
+import motions
+import viz
 from tests.pages import BRIDGES, DOCS, ROOT
+from tests.viz.replay.browsing import chromium
 
 NEEDED = ("sphinx", "furo", "math_core", "myst_nb", "sphinx_copybutton")
 MISSING = [name for name in NEEDED if find_spec(name) is None]
@@ -57,6 +62,8 @@ def test_the_links_of_the_site_lead_somewhere_and_its_pages_are_whole() -> None:
     assert {name.removeprefix("docs/") for name in (*DOCS, *BRIDGES)} <= made
     api = (target / "reference/api/controller.html").read_text(encoding="utf-8")
     assert 'id="controller.go2_controller.GO2Controller.high_five"' in api
+    assert (target / "reference/api/internals/controller.html").is_file()
+    assert 'loading="lazy"' in (target / "gallery.html").read_text(encoding="utf-8")
     works = (target / "explanation/how-it-works.html").read_text(encoding="utf-8")
     assert works.count("<math") > 20
     shown = (target / "examples.html").read_text(encoding="utf-8")
@@ -242,6 +249,37 @@ def test_every_public_module_has_its_place_in_the_reference() -> None:
     assert len(listed) == len(set(listed)) > 80
     assert rooms["controller"][:2] == ["controller", "controller.go2_controller"]
     assert not any("bridges" in name or ".cli" in name for name in listed)
+
+
+def test_what_programs_use_is_told_apart_from_internals_and_once() -> None:
+    """Every public name has its place on a page of its package, and on no other page."""
+    pages = extension("reference_pages")
+    offered = pages.offered()
+    places = [(home, name) for names in offered.values() for name, home in names.items()]
+    assert len(places) == len(set(places))
+    for package in (go2_wbc, motions, viz, controller):
+        told = {name for names in offered.values() for name in names}
+        assert {name for name in package.__all__ if name != "__version__"} <= told
+    home = "controller.go2_controller"
+    internals = pages.api_page("controller", [home])
+    assert f"{home}\n   :members:\n   :exclude-members: GO2Controller\n" in internals
+    used = pages.user_page("controller", offered["controller"])
+    assert f".. autoclass:: {home}.GO2Controller\n   :members:" in used
+    assert ".. autofunction:: controller.sweeps.run.sweep\n" in used
+
+
+def test_the_search_puts_guides_before_the_reference_and_internals_last() -> None:
+    script = (ROOT / "docs/_ext/search_scorer.js").read_text(encoding="utf-8")
+    names = ["reference/api/internals/viz", "reference/api/controller", "how-to/gait"]
+    with chromium() as browser:
+        page = browser.new_page()
+        page.add_script_tag(content=script)
+        scores = page.evaluate(
+            "(names) => names.map((n) => Scorer.score([n, '', '', '', 26]))", names
+        )
+    assert scores == sorted(scores)
+    assert scores[1] == 26
+    assert 5 + scores[2] - 26 > scores[1]  # a word in a guide, before the very name of an object
 
 
 def test_every_key_of_the_configuration_has_a_meaning_and_a_default() -> None:

@@ -29,7 +29,7 @@ PER_CELL, MOST_CELLS = 8, 6
 def relations(rows: Sequence[Row], columns: Columns, over: Sequence[str] = ()) -> list[Relation]:
     """Every outcome over every parameter, or over two that were named, as a grid.
 
-    Outcomes are the truth values and the margin; where there is no margin, all numbers.
+    Outcomes are the first truth value and the margin; where there is no margin, all numbers.
 
     Args:
         rows: of the sweep.
@@ -47,11 +47,8 @@ def relations(rows: Sequence[Row], columns: Columns, over: Sequence[str] = ()) -
         raise CommandError(f"a plot is over one or two parameters, got {len(over)}")
     given = {name: np.array([row[name] for row in rows], dtype=float) for name in numbers}
     drawn = [name for name in DRAWN if name in given and len(np.unique(given[name])) > 1]
-    outcomes = {
-        name: np.array([row[name] for row in rows], dtype=bool)
-        for name in columns
-        if columns[name] == "bool"
-    }
+    first = [name for name in columns if columns[name] == "bool"][:1]
+    outcomes = {name: np.array([row[name] for row in rows], dtype=bool) for name in first}
     margins = {name: given[name] for name in numbers if "margin" in name}
     if CLOSEST in given:
         margins["margin, share left"] = 1.0 - given[CLOSEST]

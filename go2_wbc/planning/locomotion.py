@@ -25,12 +25,12 @@ from go2_wbc.planning.gait_clock import adapt, foot_phase, restart
 from go2_wbc.planning.ground import (
     LEAST_FRICTION,
     MOST_FRICTION,
-    ROUGH_SPEED,
     Slip,
     carry_ground,
     ground_at,
     ground_below,
     haste,
+    is_rough,
     learn_ground,
     level_friction,
     note_stumble,
@@ -113,6 +113,7 @@ def adapt_gait(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) 
     is_thrown = thrown > speed
     speed = max(thrown, speed) + arm * abs(s.trunk.velocity[2])
     is_resting = is_zero(command) and is_settled(s.trunk)
+    s.clock.is_rough = is_rough(s.ground)
     adapt(s.clock, c.cadence, dt, speed, is_resting, is_thrown)
 
 
@@ -128,7 +129,7 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
         follow_position(trunk, now, config.position_leash, dt)
     else:
         rest_in_place(now, s, config.position_leash, dt)
-    carry_ground(s.ground, now, dt)
+    carry_ground(s.ground, config.rough, now, dt)
     correct_height(trunk, now, s.ground.height + c.height, dt)
 
 
@@ -146,7 +147,7 @@ def note_liftoffs(
     for leg in range(4):
         foot = s.feet[leg].contact
         if foot.was_stance and not stance[leg]:
-            begin_swing(s.feet[leg].swing, now.p_world_feet[leg], s.ground)
+            begin_swing(s.feet[leg].swing, now.p_world_feet[leg], s.ground, c.config.rough)
         if not stance[leg]:
             foot.is_awaited = False
             is_middle = abs(progress[leg] - 0.5) <= MID_SWING + TIE
@@ -213,7 +214,7 @@ def plan(
     """
     dt = time - s.time
     s.time = time
-    slow_down(s.ground, command.velocity)
+    slow_down(s.ground, c.config.rough, command.velocity)
     advance_phase(now, s, c, command, dt)
     integrate(now, s, c, command, dt)
     if s.is_stepping:
@@ -297,7 +298,8 @@ class LocomotionPlanner:
     def is_slowed(self) -> bool:
         """Whether rough ground keeps the robot slower than it is told."""
         x, y = self._state.trunk.velocity[:2].tolist()
-        return bool(self._state.ground.rough_time > 0.0 and np.hypot(x, y) > ROUGH_SPEED - TIE)
+        is_fast = bool(np.hypot(x, y) > self._config.rough.speed - TIE)
+        return is_fast and self._state.ground.rough_way > 0.0
 
     @property
     def is_stepping(self) -> bool:

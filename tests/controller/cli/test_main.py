@@ -26,6 +26,7 @@ USAGE = ExitCode.USAGE
 TRIAL = f"{swept.__name__}:trial"
 
 NEEDED = {
+    "completion": "bash",
     "certify": "bow",
     "dance": "song.wav",
     "export": "bow --out bow.csv",
