@@ -89,7 +89,7 @@ def test_the_table_fits_80_columns_and_names_the_fallen_seed() -> None:
     "name",
     [
         *("balance", "behaviour", "bridges.command", "combined", "dance", "faults", "locomotion"),
-        *("adversary", "nearest", "qp_infeasibility", "sequences"),
+        *("adversary", "qp_infeasibility", "sequences"),
     ],
 )
 def test_every_real_metric_fits_the_table_and_has_its_own_name(name: str) -> None:
