@@ -18,6 +18,7 @@ from controller.modes import Aborted, Measurements, Mode, Outcome
 from controller.navigation import DriveStraight, TurnInPlace
 from controller.pacing import REASON, LogOnce
 from controller.telemetry import Telemetry
+from go2_wbc.arguments import typed
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ClosedError, CommandError, Go2WbcError, ModeError, TimelineError
@@ -32,6 +33,9 @@ from go2_wbc.robot.state import Health, RobotState
 from go2_wbc.wbc.tasks import Task
 
 _log = logging.getLogger(__name__)
+
+LONGEST_WAIT = 1e6
+"""Time [s] of one ``wait``: 11 days."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,6 +60,7 @@ class GO2Controller:
         True
     """
 
+    @typed("after_tick")
     def __init__(
         self,
         namespace: str = "robot1",
@@ -237,6 +242,7 @@ class GO2Controller:
 
     # --- motions --------------------------------------------------------------------------
 
+    @typed("plan", error=CommandError)
     def high_five(
         self, side: str = "right", hold: float = 2.0, *, plan: motions.CompiledPlan | None = None
     ) -> bool:
@@ -261,6 +267,7 @@ class GO2Controller:
                 plan = motions.compile_timeline(timeline, self._checker.model)
         return self._call("high_five", lambda: self._pilot.play(plan, stands_up=True))
 
+    @typed("times", "check", "allow_dynamic", error=CommandError)
     def play(
         self,
         motion: motions.Playable,
@@ -304,6 +311,7 @@ class GO2Controller:
 
         return self._call("play", play)
 
+    @typed("check", error=CommandError)
     def prepare(self, motion: motions.Playable, *, check: bool = True) -> MotionPlan:
         """What ``play`` plays: compiled, and checked, for this robot. Any thread may call it.
 
@@ -342,8 +350,9 @@ class GO2Controller:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""
         self._check_open()
         seconds = finite_number("seconds", seconds)
-        if seconds < 0.0:
-            raise CommandError(f"seconds must not be negative, got {seconds}")
+        if not 0.0 <= seconds <= LONGEST_WAIT:
+            what = "must not be negative" if seconds < 0.0 else f"must be {LONGEST_WAIT:g} at most"
+            raise CommandError(f"seconds {what}, got {seconds}")
         self._call("wait", lambda: self._pilot.wait(seconds), allow_fallen=True)
 
     # --- looking --------------------------------------------------------------------------
@@ -388,6 +397,7 @@ class GO2Controller:
         """Peaks and counts of the run so far."""
         return self._runner.loop.telemetry
 
+    @typed(error=CommandError)
     def recording(self, rate: float = 100.0) -> Recording:
         """The run so far (its last minutes), at about ``rate`` samples a second."""
         samples = self._runner.between_ticks(lambda: self.telemetry.samples(rate))

@@ -14,6 +14,7 @@ from dataclasses import InitVar, dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.errors import CommandError, ConfigError, unknown_name
 from go2_wbc.legs import LEGS
@@ -54,6 +55,7 @@ class ContactPhase:
         return np.where(self.stance, np.clip(nearest_change / max(ramp, TIE), 0.0, 1.0), 0.0)
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 class ContactSchedule:
     """Events in increasing order: from ``times[i]`` on, the feet ``modes[i]`` are in stance.
@@ -103,6 +105,7 @@ class ContactSchedule:
             before, after = changes[-1] - self.period, changes[0] + self.period
         return np.array([before, *changes, after])
 
+    @typed(late=True)
     def at(self, t: float) -> ContactPhase:
         """The contacts at ``t`` seconds after the schedule's start."""
         if self.period is not None:
@@ -112,6 +115,7 @@ class ContactSchedule:
         elapsed = np.maximum(t - self.since[index], 0.0)
         return ContactPhase(self.modes[index].copy(), elapsed, self.until[index] - t)
 
+    @typed(late=True)
     def at_times(self, times: Float[np.ndarray, " n"]) -> ContactPhase:
         """The contacts at many instants [s], (n, 4): those that ``at`` gives for each."""
         if self.period is not None:
@@ -151,6 +155,7 @@ class Stride:
             )
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @retires(needs_mpc=Retired(True, "the forces of every gait are planned ahead"))
 @ranged(period=POSITIVE, duty=SHARE, envelope_share=SHARE, width=SHARE)
@@ -205,6 +210,7 @@ class Gait:
         """Seconds that a foot swings in each stride."""
         return (1.0 - self.duty) * self.period
 
+    @typed()
     def placed(self, p_base_feet: Float[np.ndarray, "4 3"]) -> Float[np.ndarray, "4 3"]:
         """The standing robot's feet, or what else has two sides, as far apart as in this gait."""
         return p_base_feet * [1.0, self.width, 1.0]

@@ -11,7 +11,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
 from controller.cli.common import ExitCode, print_json_line
-from controller.cli.options import Mjcf, Numbers
+from controller.cli.options import Mjcf, Numbers, dds_domain
 from go2_wbc.errors import PlantError
 from go2_wbc.world import SENSORS
 
@@ -49,7 +49,7 @@ def ros2(
 
 def unitree_sim(
     *,
-    domain: Annotated[int, "N", "default %(default)s"] = 1,
+    domain: Annotated[int, "N", "default %(default)s", dds_domain] = 1,
     interface: Annotated[str, "NAME", "network, default %(default)s"] = "lo",
     mjcf: Mjcf = None,
     friction: Annotated[float | None, "MU", "of the feet, default 0.8"] = None,
@@ -95,7 +95,7 @@ def unitree_sim(
 def unitree_drive(
     *,
     interface: Annotated[str, "NAME", "lo for a simulator"],
-    domain: Annotated[int, "N", "0 robot, 1 simulator"] = 0,
+    domain: Annotated[int, "N", "0 robot, 1 simulator", dds_domain] = 0,
     i_have_the_remote_in_hand: Annotated[bool, "required: you can stop it"] = False,
     steps: Annotated[
         tuple[str, ...],

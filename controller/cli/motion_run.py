@@ -18,7 +18,7 @@ from controller.cli.motion_args import (
     checker_of,
     the_motion,
 )
-from controller.cli.options import Html, Json, Numbers
+from controller.cli.options import Html, Json, Numbers, whole
 from controller.cli.progress import ProgressLine
 from go2_wbc.errors import PlantError, StanceMismatch
 
@@ -45,7 +45,7 @@ def run(
     friction: Friction = None,
     payload: Payload = None,
     sensors: Sensors = "ideal",
-    seed: Annotated[int, "N", "of sensors and of what the world leaves open"] = 0,
+    seed: Annotated[int, "N", "of sensors and of what the world leaves open", whole] = 0,
     config: Numbers = None,
     html: Annotated[Html, "write a 3D replay page, the plan as a ghost"] = None,
     json: Json = False,
