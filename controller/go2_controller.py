@@ -34,9 +34,6 @@ from go2_wbc.wbc.tasks import Task
 
 _log = logging.getLogger(__name__)
 
-LONGEST_WAIT = 1e6
-"""Time [s] of one ``wait``: 11 days."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Call:
@@ -186,8 +183,6 @@ class GO2Controller:
     ) -> None:
         """Walk like this until the next command; takes no time by itself.
 
-        A velocity beyond the envelope of the gait is clipped to it; the first one is warned of.
-
         Args:
             linear_x: forward speed [m/s], negative is backward.
             angular_z: turning rate [rad/s], positive is left.
@@ -224,7 +219,6 @@ class GO2Controller:
 
         Ends at rest in walking mode.
         """
-        angle = finite_number("angle", angle)
         return self._call("turn_left", lambda: self._pilot.run_goal(TurnInPlace(angle)))
 
     def turn_right(self, angle: float) -> bool:
@@ -237,7 +231,6 @@ class GO2Controller:
 
         Ends at rest in walking mode.
         """
-        distance = finite_number("distance", distance)
         return self._call("move_forward", lambda: self._pilot.run_goal(DriveStraight(distance)))
 
     # --- motions --------------------------------------------------------------------------
@@ -349,10 +342,7 @@ class GO2Controller:
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""
         self._check_open()
-        seconds = finite_number("seconds", seconds)
-        if not 0.0 <= seconds <= LONGEST_WAIT:
-            what = "must not be negative" if seconds < 0.0 else f"must be {LONGEST_WAIT:g} at most"
-            raise CommandError(f"seconds {what}, got {seconds}")
+        seconds = arguments.time("seconds", seconds)
         self._call("wait", lambda: self._pilot.wait(seconds), allow_fallen=True)
 
     # --- looking --------------------------------------------------------------------------
@@ -470,7 +460,7 @@ class GO2Controller:
                 self._pilot.collapse(reason)
                 reason = f"{reason}, damped"
             finally:
-                self._note(call, reason)
+                self._note(call, reason, ok=False)
             raise
         finally:  # no function is called in here: Python looks for Ctrl-C when one returns
             if "call" in self._turn and self._turn["call"] is call:
@@ -482,31 +472,25 @@ class GO2Controller:
             self._pilot.begin()
             measured = procedure()
         except Aborted as aborted:
-            self._note(call, str(aborted), aborted.measured)
+            self._note(call, str(aborted), aborted.measured, ok=False)
             return False
         except Go2WbcError as error:
-            self._note(call, str(error), is_raised=True)
+            self._note(call, str(error), ok=None)
             raise
         self._note(call, "done", measured, ok=True)
         return True
 
     def _note(
-        self,
-        call: _Call,
-        reason: str,
-        measured: Measurements | None = None,
-        *,
-        ok: bool = False,
-        is_raised: bool = False,
+        self, call: _Call, reason: str, found: Measurements | None = None, *, ok: bool | None
     ) -> None:
-        """What came of ``call``, and which parts are broken that the reason does not name."""
+        """What came of ``call``, broken parts named; ``ok`` is None if it is raised, too."""
         if untold := [str(f) for f in self.health.faults if str(f) not in reason]:
             reason = "; ".join([reason, *untold])
         duration = self._runner.loop.state.time - call.start
-        self._last = Outcome(ok, reason, duration, dict(measured or {}))
+        self._last = Outcome(bool(ok), reason, duration, dict(found or {}))
         fault = self._runner.loop.fault
-        is_told = is_raised or (fault is not None and fault.reason in reason)  # logged by the loop
-        if ok or is_told:
+        is_known = fault is not None and fault.reason in reason  # the loop has logged it
+        if ok is not False or is_known:
             _log.info("%s() after %.2f s: %s", call.name, duration, reason)
         else:
             _log.warning(REASON, reason)

@@ -13,7 +13,7 @@ import inspect
 import typing
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import InitVar
-from functools import cache, wraps
+from functools import cached_property, wraps
 from numbers import Integral
 from pathlib import Path
 from types import NoneType, UnionType
@@ -34,7 +34,7 @@ _UNIONS = (UnionType, typing.Union)
 def typed(
     *names: str, error: type[Go2WbcError] = ConfigError, late: bool = False
 ) -> Callable[[_Item], _Item]:
-    """Let a function, or the constructor of a class, refuse what its annotations do not take.
+    """Let a function, or a value's constructor, refuse what its annotations do not take.
 
     Numbers must be finite, and ``LARGEST`` at most. A default is always taken. Where only a type
     checker can tell, nothing is refused.
@@ -48,49 +48,66 @@ def typed(
 
     def decorate(item: _Item) -> _Item:
         if not isinstance(item, type):
-            return cast(_Item, _refusing(item, error, names, late=late))
-        setattr(item, "__init__", _refusing(item.__init__, error, names, late=late))  # noqa: B010
+            return cast(_Item, _refusing(item, _Taken(item, names, error), late=late))
+        taken = _Taken(item.__init__, names, error)
+        own = _refusing(item.__init__, taken, late=True, is_made=True)
+        setattr(item, "__init__", own)  # noqa: B010
         return cast(_Item, item)
 
     return decorate
 
 
-def _refusing(
-    call: Callable[..., object], error: type[Go2WbcError], names: tuple[str, ...], *, late: bool
-) -> Callable[..., object]:
-    signature = inspect.signature(call)
+class _Taken:
+    """What a call takes, by the annotations of its parameters."""
 
-    @cache
-    def kinds() -> dict[str, object]:
-        hints = typing.get_type_hints(call)
-        return {name: hints[name] for name in names or signature.parameters if name in hints}
+    def __init__(
+        self, call: Callable[..., object], names: tuple[str, ...], error: type[Go2WbcError]
+    ) -> None:
+        self._call, self._names, self._error = call, names, error
+        self._signature = inspect.signature(call)
 
-    def require(*args: object, **keywords: object) -> None:
+    @cached_property
+    def _kinds(self) -> dict[str, object]:
+        """By name; worked out late, since names may not be there yet when a class is made."""
+        hints = typing.get_type_hints(self._call)
+        names = self._names or tuple(self._signature.parameters)
+        return {name: hints[name] for name in names if name in hints}
+
+    def require(self, *args: object, **keywords: object) -> None:
+        """Raise the error for the first argument that is not taken."""
         try:
-            given = signature.bind(*args, **keywords).arguments
+            given = self._signature.bind(*args, **keywords).arguments
         except TypeError:  # Python says what is missing, or too much
             return
-        for name, kind in kinds().items():
-            parameter = signature.parameters[name]
+        for name, kind in self._kinds.items():
+            parameter = self._signature.parameters[name]
             if name not in given or given[name] is parameter.default:
                 continue
             several = parameter.kind is parameter.VAR_POSITIONAL
             for value in given[name] if several else (given[name],):
                 if not _fits(value, kind):
-                    raise error(f"{name} must be {_in_words(kind)}, got {value!r:.80}") from None
+                    must = f"{name} must be {_in_words(kind)}"
+                    raise self._error(f"{must}, got {value!r:.80}") from None
 
+
+def _refusing(
+    call: Callable[..., object], taken: _Taken, *, late: bool, is_made: bool = False
+) -> Callable[..., object]:
     @wraps(call)
     def checked(*args: object, **keywords: object) -> object:
         if not late:
-            require(*args, **keywords)
+            taken.require(*args, **keywords)
             return call(*args, **keywords)
         try:
-            return call(*args, **keywords)
+            result = call(*args, **keywords)
         except Go2WbcError:
             raise
         except Exception:
-            require(*args, **keywords)
+            taken.require(*args, **keywords)
             raise
+        if is_made:  # what its own checks say comes first
+            taken.require(*args, **keywords)
+        return result
 
     return checked
 

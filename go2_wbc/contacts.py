@@ -81,7 +81,9 @@ class ContactSchedule:
         """Check the order of the events and find each foot's changes."""
         rising = all(b > a for a, b in zip(self.times[:-1], self.times[1:], strict=True))
         if not self.times or not rising or len(self.modes) != len(self.times):
-            raise CommandError(f"contact events need increasing times, got {self.times}")
+            raise CommandError(
+                f"contact events need increasing times, and as many modes, got {self.times}"
+            )
         if self.period is not None and (self.times[0] != 0.0 or self.times[-1] >= self.period):
             raise CommandError(
                 f"periodic contact events must start at 0 and end before the period of "

@@ -145,9 +145,9 @@ class Arrangement(TimelineData):
 
     def repeat(self, times: int) -> Self:
         """This whole motion, ``times`` times one after another; it must end as it began."""
-        if isinstance(times, bool) or not isinstance(times, int) or times < 1:
-            raise TimelineError(f"repeat() needs a whole number of 1 or more, got {times!r}")
-        self._require_length(min(times, LARGEST) * max(self.end, SHORTEST))
+        if isinstance(times, bool) or not isinstance(times, int) or not 1 <= times <= LARGEST:
+            raise TimelineError(f"repeat() needs a whole number of 1 or more, got {times!r:.80}")
+        self._require_length(times * max(self.end, SHORTEST))
         return self.then(*[self] * (times - 1))
 
     def mirror(self) -> Self:

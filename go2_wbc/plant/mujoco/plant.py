@@ -78,16 +78,7 @@ class MujocoPlant(Plant):
         DescriptionError: if the robot's files are missing or broken.
     """
 
-    @typed(
-        "noise",
-        "errors",
-        "estimator",
-        "visuals",
-        "joint_dynamics",
-        "seed",
-        "payload_place",
-        "robot",
-    )
+    @typed("noise", "errors", "estimator")
     def __init__(
         self,
         mjcf: Path | str | None = None,
@@ -271,7 +262,7 @@ class MujocoPlant(Plant):
             self._imu = sample if noise is None else noise.corrupt_imu(sample, self._rng)
         return self._imu
 
-    @typed()
+    @typed(error=CommandError, late=True)
     def push(self, force: Float[np.ndarray, "3"], duration: float, at: str = "base") -> None:
         """Pushes the robot, starting now; pushes overlay.
 
@@ -287,7 +278,7 @@ class MujocoPlant(Plant):
         self._check_open()
         self._pushes.add(force, duration, at)
 
-    @typed()
+    @typed(error=CommandError, late=True)
     def fault(
         self, kind: str, part: str = "", at: float | None = None, value: float | None = None
     ) -> None:
@@ -321,7 +312,7 @@ class MujocoPlant(Plant):
         watch = self._senses or self._faults.watch
         return () if watch is None else watch.faults
 
-    @typed()
+    @typed(late=True)
     def place(self, q: Float[np.ndarray, "19"], v: Float[np.ndarray, "18"] | None = None) -> None:
         """Moves the robot to a state at once, for tests and experiments; time stands still.
 
