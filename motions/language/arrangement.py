@@ -89,7 +89,7 @@ class Arrangement(TimelineData):
         interval = 60.0 / beats_per_minute
         return self._counted(BeatClock.steady(interval), shift_time)
 
-    @typed("times", error=TimelineError)
+    @typed("times", error=TimelineError, late=True)
     def on_beats(self, times: Iterable[float], *, shift_time: float | None = None) -> Self:
         """Count in the beats at these ``times`` [s] of the motion from here on.
 

@@ -81,7 +81,7 @@ class TimelineData:
 
     def __post_init__(self) -> None:
         """Raise TimelineError for what is out of range, or a track that moves twice at once."""
-        if not (isinstance(self.name, str) and self.name):
+        if not isinstance(self.name, str):
             raise TimelineError(f"name must be a word, got {self.name!r}")
         if not isinstance(self.balance, bool):
             raise TimelineError(f"balance must be True or False, got {self.balance!r}")
