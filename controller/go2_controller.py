@@ -18,6 +18,7 @@ from controller.modes import Aborted, Measurements, Mode, Outcome
 from controller.navigation import DriveStraight, TurnInPlace
 from controller.pacing import REASON, LogOnce
 from controller.telemetry import Telemetry
+from go2_wbc.arguments import typed
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ClosedError, CommandError, Go2WbcError, ModeError, TimelineError
@@ -57,6 +58,7 @@ class GO2Controller:
         True
     """
 
+    @typed("after_tick")
     def __init__(
         self,
         namespace: str = "robot1",
@@ -181,8 +183,6 @@ class GO2Controller:
     ) -> None:
         """Walk like this until the next command; takes no time by itself.
 
-        A velocity beyond the envelope of the gait is clipped to it; the first one is warned of.
-
         Args:
             linear_x: forward speed [m/s], negative is backward.
             angular_z: turning rate [rad/s], positive is left.
@@ -222,7 +222,6 @@ class GO2Controller:
         Raises:
             CommandError: for what is no finite number, or looks like degrees.
         """
-        angle = finite_number("angle", angle)
         return self._call("turn_left", lambda: self._pilot.run_goal(TurnInPlace(angle)))
 
     def turn_right(self, angle: float) -> bool:
@@ -242,11 +241,11 @@ class GO2Controller:
         Raises:
             CommandError: for what is no finite number.
         """
-        distance = finite_number("distance", distance)
         return self._call("move_forward", lambda: self._pilot.run_goal(DriveStraight(distance)))
 
     # --- motions --------------------------------------------------------------------------
 
+    @typed("plan", error=CommandError)
     def high_five(
         self, side: str = "right", hold: float = 2.0, *, plan: motions.CompiledPlan | None = None
     ) -> bool:
@@ -271,6 +270,7 @@ class GO2Controller:
                 plan = motions.compile_timeline(timeline, self._checker.model)
         return self._call("high_five", lambda: self._pilot.play(plan, stands_up=True))
 
+    @typed("times", "check", "allow_dynamic", error=CommandError)
     def play(
         self,
         motion: motions.Playable,
@@ -311,6 +311,7 @@ class GO2Controller:
 
         return self._call("play", play)
 
+    @typed("check", error=CommandError)
     def prepare(self, motion: motions.Playable, *, check: bool = True) -> MotionPlan:
         """What ``play`` plays: compiled, and checked, for this robot. Any thread may call it.
 
@@ -352,8 +353,7 @@ class GO2Controller:
             CommandError: for what is no finite number of 0 or more.
         """
         self._check_open()
-        if (seconds := finite_number("seconds", seconds)) < 0.0:
-            raise CommandError(f"seconds must not be negative, got {seconds}")
+        seconds = arguments.time("seconds", seconds)
         self._call("wait", lambda: self._pilot.wait(seconds), allow_fallen=True)
 
     # --- looking --------------------------------------------------------------------------
@@ -398,6 +398,7 @@ class GO2Controller:
         """Peaks and counts of the run so far."""
         return self._runner.loop.telemetry
 
+    @typed(error=CommandError)
     def recording(self, rate: float = 100.0) -> Recording:
         """The run so far (its last minutes), at about ``rate`` samples a second."""
         samples = self._runner.between_ticks(lambda: self.telemetry.samples(rate))
@@ -489,8 +490,8 @@ class GO2Controller:
         duration = self._runner.loop.state.time - call.start
         self._last = replace(outcome, reason=reason, duration=duration)
         fault = self._runner.loop.fault
-        is_told = is_raised or (fault is not None and fault.reason in reason)  # logged by the loop
-        if ok or is_told:
+        is_known = is_raised or (fault is not None and fault.reason in reason)  # logged by the loop
+        if ok or is_known:
             _log.info("%s() after %.2f s: %s", call.name, duration, reason)
         else:
             _log.warning(REASON, reason)

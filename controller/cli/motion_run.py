@@ -21,7 +21,7 @@ from controller.cli.motion_args import (
     the_motion,
 )
 from controller.cli.motion_preview import VIDEO_RATE
-from controller.cli.options import Html, Json, Mjcf, Numbers, output, video_file
+from controller.cli.options import Html, Json, Mjcf, Numbers, output, video_file, whole
 from controller.cli.progress import ProgressLine
 from controller.modes import Mode
 from go2_wbc.errors import PlantError, StanceMismatch
@@ -74,7 +74,7 @@ def run(
     friction: Friction = None,
     payload: Payload = None,
     sensors: Sensors = "ideal",
-    seed: Annotated[int, "N", "of sensors and of what the world leaves open"] = 0,
+    seed: Annotated[int, "N", "of sensors and of what the world leaves open", whole] = 0,
     config: Numbers = None,
     scene: Annotated[Scene, "scene"],
     files: Annotated[Files, "files"],

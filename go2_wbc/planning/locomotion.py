@@ -16,8 +16,10 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.contacts import TIE, Gait
+from go2_wbc.errors import CommandError
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.footholds import foothold, nominal_feet
 from go2_wbc.planning.force_mpc import apply_force_plan
@@ -244,12 +246,14 @@ def plan(
 class LocomotionPlanner:
     """Turns a velocity command into references, one tick after the other."""
 
+    @typed()
     def __init__(self, model: RobotModel, gait: Gait, config: LocomotionConfig) -> None:
         """Prepare a planner; ``start`` sets it on its way."""
         self._model, self._config = model, config
         self._state, self._command = Planner(), Command()
         self.change_gait(gait)
 
+    @typed()
     def start(
         self, snapshot: Snapshot, friction: float | None = None, has_slid: bool = True
     ) -> None:
@@ -261,6 +265,8 @@ class LocomotionPlanner:
             has_slid: whether a foot has shown that, and not only that it is at least as high.
         """
         known = self._config.ground_friction if friction is None else friction
+        if known <= 0.0:
+            raise CommandError(f"friction must be above 0, got {friction}")
         feet = [
             Foot(
                 contact=FootContact(since=np.inf, was_stance=True),
@@ -281,6 +287,7 @@ class LocomotionPlanner:
         )
         restart(self._state.clock, self._walk.cadence)
 
+    @typed()
     def change_gait(self, gait: Gait) -> None:
         """Walk on with ``gait``; while it walks the strides pass over into it one after the other.
 
@@ -321,6 +328,7 @@ class LocomotionPlanner:
         """Whether a foot has, and has shown that friction."""
         return bool(self._state.slip.has_slid)
 
+    @typed(late=True)
     def square_up(self, snapshot: Snapshot) -> bool:
         """Start stepping unless every foot is below its hip; returns whether they all are."""
         is_done = bool(is_square(snapshot, self._state, self._walk))
@@ -332,6 +340,7 @@ class LocomotionPlanner:
         """Why a robot without a command has not come to rest, in plain words; "" if it has."""
         return why_not_resting(snapshot, self._state, self._walk)
 
+    @typed(late=True)
     def update(
         self, snapshot: Snapshot, command: VelocityCommand, pose: BodyPose = LEVEL
     ) -> Reference:

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, unknown_name
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant
@@ -80,6 +81,7 @@ class MujocoPlant(Plant):
         DescriptionError: if the robot's files are missing or broken.
     """
 
+    @typed("noise", "errors", "estimator")
     def __init__(
         self,
         mjcf: Path | str | None = None,
@@ -226,6 +228,7 @@ class MujocoPlant(Plant):
             self._truth = RobotState(self.time, q, v, self._tau.copy(), forces, touching)
         return self._truth
 
+    @typed(late=True)
     def write(self, command: JointCommand) -> None:
         """Applies ``command`` for one control period, with the motor law at every physics step.
 
@@ -265,6 +268,7 @@ class MujocoPlant(Plant):
             self._imu = sample if noise is None else noise.corrupt_imu(sample, self._rng)
         return self._imu
 
+    @typed(error=CommandError, late=True)
     def push(self, force: Float[np.ndarray, "3"], duration: float, at: str = "base") -> None:
         """Pushes the robot, starting now; pushes overlay.
 
@@ -280,6 +284,7 @@ class MujocoPlant(Plant):
         self._check_open()
         self._pushes.add(force, duration, at)
 
+    @typed(error=CommandError, late=True)
     def fault(
         self, kind: str, part: str = "", at: float | None = None, value: float | None = None
     ) -> None:
@@ -313,6 +318,7 @@ class MujocoPlant(Plant):
         watch = self._senses or self._faults.watch
         return () if watch is None else watch.faults
 
+    @typed(late=True)
     def place(self, q: Float[np.ndarray, "19"], v: Float[np.ndarray, "18"] | None = None) -> None:
         """Moves the robot to a state at once, for tests and experiments; time stands still.
 
@@ -392,6 +398,7 @@ class MujocoPlant(Plant):
             faults=self._faults.save(),
         )
 
+    @typed(late=True)
     def restore(self, saved: SavedPhysics) -> None:
         """Goes back to a state that ``save`` of this plant, or of one built alike, returned."""
         self._check_open()
