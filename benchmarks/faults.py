@@ -127,8 +127,9 @@ def measure_break(trial: Trial, found: TrialResult, what: Break) -> None:
             values = _lived_through(robot, state, at)
             health, reason = robot.go2.health, robot.go2.last_outcome.reason
         names = {what.named.format(part) for part in parts}
-        times = [fault.since - at for fault in health.faults if fault.part in names]
-        values["named"] = len(times) == len(names) and max(times) <= NAMED_WITHIN
+        told = reversed(health.faults)  # of a part that is named twice, when it first was
+        times = {fault.part: fault.since - at for fault in told if fault.part in names}
+        values["named"] = len(times) == len(names) and max(times.values()) <= NAMED_WITHIN
         values["others"] = len(health.faults) - len(times)
         found.notes[state] = f"{', '.join(parts)} at {at:.2f} s: {health}; {reason}"
         found.values |= {f"{state}-{name}": float(value) for name, value in values.items()}
