@@ -15,8 +15,6 @@ two minutes of random calls of a sound robot in a world of other tables, every o
 random pushes; no part may be named. Numbers were chosen on seeds below 9000.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import partial

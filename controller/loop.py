@@ -21,6 +21,7 @@ import numpy as np
 
 from controller.behaviours import Behaviour
 from controller.behaviours.joints import DAMPING, Damped
+from controller.pacing import REASON
 from controller.telemetry import Telemetry
 from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible
 from go2_wbc.plant.base import Plant
@@ -139,7 +140,7 @@ class ControlLoop:
         self.fault = fault
         self.behaviour = Damped("fallen" if fault.is_fall else "damped")
         self.behaviour.start(self.snapshot)
-        self.warn("%s", fault.reason)
+        self.warn(REASON, fault.reason)
 
     def go_limp(self) -> None:
         """Send the safe command once, even to a plant that fails."""
@@ -199,7 +200,7 @@ class ControlLoop:
         faults = (*self.plant.sensor_faults, *self._motors.faults, *self._feet.faults)
         if len(faults) != len(self.health.faults):
             for fault in (fault for fault in faults if fault not in self.health.faults):
-                self.warn("%s", fault)
+                self.warn(REASON, fault)
             self.health = Health(faults)
         if faults and self.fault is None and self.behaviour.needs_balance:
             grave = [str(fault) for fault in faults if not fault.is_survived]

@@ -85,8 +85,8 @@ def motions_of(word: str) -> list[Motion]:
 
 
 def print_verdict(report: FeasibilityReport) -> None:
-    """Print a line about a motion, and one for each limit that it breaks."""
-    lines = [report.summary(), *(f"     {finding}" for finding in report.failures)]
+    """Print a line about a motion, and one for each further limit that it breaks."""
+    lines = [report.summary(), *(f"     {finding}" for finding in report.failures[1:])]
     print("\n".join(lines), flush=True)
 
 

@@ -16,8 +16,10 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.contacts import TIE, Gait
+from go2_wbc.errors import CommandError
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.footholds import foothold, nominal_feet
 from go2_wbc.planning.force_mpc import apply_force_plan
@@ -25,11 +27,12 @@ from go2_wbc.planning.gait_clock import adapt, foot_phase, restart
 from go2_wbc.planning.ground import (
     LEAST_FRICTION,
     MOST_FRICTION,
-    ROUGH_SPEED,
     Slip,
     carry_ground,
     ground_at,
     ground_below,
+    haste,
+    is_rough,
     learn_ground,
     level_friction,
     note_stumble,
@@ -112,6 +115,7 @@ def adapt_gait(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) 
     is_thrown = thrown > speed
     speed = max(thrown, speed) + arm * abs(s.trunk.velocity[2])
     is_resting = is_zero(command) and is_settled(s.trunk)
+    s.clock.is_rough = is_rough(s.ground)
     adapt(s.clock, c.cadence, dt, speed, is_resting, is_thrown)
 
 
@@ -120,13 +124,14 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
     """Ramp velocity and pose, integrate to the place, apply the leash, correct the height."""
     trunk, config = s.trunk, c.config
     advance_pose(trunk.pose, trunk.pose_rate, config.pose, command.pose, dt)
-    ramp(trunk.velocity, command, config.linear_acceleration, config.angular_acceleration, dt)
+    linear = haste(s.ground, s.slip.friction) * config.linear_acceleration
+    ramp(trunk.velocity, command, linear, config.angular_acceleration, dt)
     follow_heading(trunk, now, config.yaw_leash, dt)
     if s.is_stepping:
         follow_position(trunk, now, config.position_leash, dt)
     else:
         rest_in_place(now, s, config.position_leash, dt)
-    carry_ground(s.ground, now, dt)
+    carry_ground(s.ground, config.rough, now, dt)
     correct_height(trunk, now, s.ground.height + c.height, dt)
 
 
@@ -144,7 +149,7 @@ def note_liftoffs(
     for leg in range(4):
         foot = s.feet[leg].contact
         if foot.was_stance and not stance[leg]:
-            begin_swing(s.feet[leg].swing, now.p_world_feet[leg], s.ground)
+            begin_swing(s.feet[leg].swing, now.p_world_feet[leg], s.ground, c.config.rough)
         if not stance[leg]:
             foot.is_awaited = False
             is_middle = abs(progress[leg] - 0.5) <= MID_SWING + TIE
@@ -211,7 +216,7 @@ def plan(
     """
     dt = time - s.time
     s.time = time
-    slow_down(s.ground, command.velocity)
+    slow_down(s.ground, c.config.rough, command.velocity)
     advance_phase(now, s, c, command, dt)
     integrate(now, s, c, command, dt)
     if s.is_stepping:
@@ -226,7 +231,8 @@ def plan(
         foot, p = s.feet[leg].contact, now.p_world_feet[leg]
         above = p[2] - c.foot_radius - ground_at(s.ground, p[0], p[1])
         stands[leg] = follow_contact(foot, above, contact[leg], stance[leg], progress[leg], dt)
-    observe_slip(s.slip, now, contact, tau, stands, s.is_stepping, dt)
+    steps, beside = s.is_stepping, c.stands_beside_com
+    observe_slip(s.slip, now, contact, tau, stands, steps, beside, dt)
     note_liftoffs(now, s, c, contact, stance, progress)
     target.friction = level_friction(s.ground, s.slip.friction, LEAST_FRICTION)
     fill_body(s.trunk, s.ground, c.height, target)
@@ -240,20 +246,27 @@ def plan(
 class LocomotionPlanner:
     """Turns a velocity command into references, one tick after the other."""
 
+    @typed()
     def __init__(self, model: RobotModel, gait: Gait, config: LocomotionConfig) -> None:
         """Prepare a planner; ``start`` sets it on its way."""
         self._model, self._config = model, config
         self._state, self._command = Planner(), Command()
         self.change_gait(gait)
 
-    def start(self, snapshot: Snapshot, friction: float | None = None) -> None:
+    @typed()
+    def start(
+        self, snapshot: Snapshot, friction: float | None = None, has_slid: bool = True
+    ) -> None:
         """Begin from the measured state, standing.
 
         Args:
             snapshot: of this tick.
             friction: of the ground, as it is known; None if nothing is.
+            has_slid: whether a foot has shown that, and not only that it is at least as high.
         """
         known = self._config.ground_friction if friction is None else friction
+        if known <= 0.0:
+            raise CommandError(f"friction must be above 0, got {friction}")
         feet = [
             Foot(
                 contact=FootContact(since=np.inf, was_stance=True),
@@ -266,12 +279,15 @@ class LocomotionPlanner:
             trunk=Trunk(yaw=snapshot.state.yaw, position=snapshot.p_world_com[:2]),
             rest=Rest(place=snapshot.p_world_com[:2], middle=snapshot.p_world_feet.mean(axis=0)),
             ground=ground_below(snapshot, self._model.foot_radius),
-            slip=Slip(friction=min(known, MOST_FRICTION)),
+            slip=Slip(
+                friction=min(known, MOST_FRICTION), has_slid=friction is not None and has_slid
+            ),
             feet=feet,
             planned=PlannedForces(next=-np.inf),
         )
         restart(self._state.clock, self._walk.cadence)
 
+    @typed()
     def change_gait(self, gait: Gait) -> None:
         """Walk on with ``gait``; while it walks the strides pass over into it one after the other.
 
@@ -289,7 +305,8 @@ class LocomotionPlanner:
     def is_slowed(self) -> bool:
         """Whether rough ground keeps the robot slower than it is told."""
         x, y = self._state.trunk.velocity[:2].tolist()
-        return bool(self._state.ground.rough_time > 0.0 and np.hypot(x, y) > ROUGH_SPEED - TIE)
+        is_fast = bool(np.hypot(x, y) > self._config.rough.speed - TIE)
+        return is_fast and self._state.ground.rough_way > 0.0
 
     @property
     def is_stepping(self) -> bool:
@@ -306,6 +323,12 @@ class LocomotionPlanner:
         """Of the ground, as far as it has been shown; 0 before ``start``."""
         return float(self._state.slip.friction)
 
+    @property
+    def has_slid(self) -> bool:
+        """Whether a foot has, and has shown that friction."""
+        return bool(self._state.slip.has_slid)
+
+    @typed(late=True)
     def square_up(self, snapshot: Snapshot) -> bool:
         """Start stepping unless every foot is below its hip; returns whether they all are."""
         is_done = bool(is_square(snapshot, self._state, self._walk))
@@ -317,6 +340,7 @@ class LocomotionPlanner:
         """Why a robot without a command has not come to rest, in plain words; "" if it has."""
         return why_not_resting(snapshot, self._state, self._walk)
 
+    @typed(late=True)
     def update(
         self, snapshot: Snapshot, command: VelocityCommand, pose: BodyPose = LEVEL
     ) -> Reference:

@@ -1,6 +1,6 @@
 """A foot that is held in the air is named, unless it touches something or all is upset."""
 
-from __future__ import annotations
+from typing import Any
 
 import numpy as np
 import pytest
@@ -42,6 +42,6 @@ def test_a_held_foot_is_named_once() -> None:
     ],
 )
 def test_a_foot_that_follows_stumbles_is_struck_or_tumbles_is_not_held(
-    changes: dict[str, float],
+    changes: dict[str, Any],
 ) -> None:
     assert watched(**{"held": 3.0 * PULLED, **changes}).faults == ()

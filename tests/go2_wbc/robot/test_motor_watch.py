@@ -1,7 +1,5 @@
 """A motor is judged by what it was asked for and what it gave."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Which sensor is broken is found from the others; a sound robot's readings are left alone."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 
 import numpy as np
