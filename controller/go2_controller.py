@@ -249,7 +249,6 @@ class GO2Controller:
         """Raise a front paw on three legs, hold it, tap, and come back to standing.
 
         Args:
-            side: "right" or "left".
             hold: time [s] for which the paw is held up, 0.5 to 30.
             plan: what this motion was compiled to before; by default it is compiled now.
 
