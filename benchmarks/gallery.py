@@ -5,8 +5,6 @@ robot, as measured, is farthest from it and from each other. With ``--film`` it 
 ``images/demo.webp`` instead: the README's film, the demo from the first steps on.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from pathlib import Path

@@ -10,8 +10,6 @@ of 7300 to 7319 had been seen before the last settings were chosen; none of thos
 here was looked at before.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable
@@ -21,8 +19,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from benchmarks.command import Benchmark
-from benchmarks.dynamic_motions import AFTERWARDS
-from benchmarks.dynamic_motions import FIRST_SEED as ROBOTS
 from benchmarks.robots import loads, plant_of
 from benchmarks.study import Study, TrialResult
 from controller.motion_measurement import during_motion
@@ -37,7 +33,9 @@ from motions.language.timeline_data import NEAREST
 from motions.plan.dynamic_span import DynamicSpan
 from motions.plan.trajectory import as_written
 
-FIRST_SEED = 8600  # Seed of the first motion that is judged
+FIRST_SEED, ROBOTS = 8600, 6200  # Seeds of the first motion that is judged, and of its robot
+AFTERWARDS = 1.0
+"""Time [s] for which the robot must stand when the motion is over."""
 AS_REPORTED = 10.0
 """Difference [mm] between the measured and the reported deviation, of every motion."""
 LARGEST = {"x": 0.05, "y": 0.05, "z": 0.05, "roll": 0.25, "pitch": 0.25, "yaw": 0.35}

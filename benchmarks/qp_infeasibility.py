@@ -5,8 +5,6 @@ ends of their joints. The limits of ``wbc.relaxation`` were chosen on box layout
 pushes; no seed of theirs is judged here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial

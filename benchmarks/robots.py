@@ -1,7 +1,5 @@
 """Robots on trial, what pushes them, and what is true of them by the simulator."""
 
-from __future__ import annotations
-
 import atexit
 import math
 import shutil
@@ -19,7 +17,6 @@ from go2_wbc.legs import LEGS
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.plant.mujoco.model import JointDynamics, build_spec
-from go2_wbc.reference import Anchor
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.profile import find_profile
@@ -103,12 +100,6 @@ def force_of(impulse: float, direction: str) -> Float[np.ndarray, "3"]:
 def heading_force(angle: float, impulse: float) -> Float[np.ndarray, "3"]:
     """Force [N] that gives ``impulse`` [N s] at ``angle`` [rad] from ahead to the left."""
     return impulse / PUSH_TIME * np.array([math.cos(angle), math.sin(angle), 0.0])
-
-
-def feet_frame(robot: TrialRobot) -> Anchor:
-    """The frame of the feet as they stand, in truth."""
-    model = RobotModel()
-    return Anchor.of_feet(model.snapshot(robot.plant.truth()).p_world_feet, model.foot_radius)
 
 
 def way_between(before: RobotState, after: RobotState) -> tuple[float, float, float]:

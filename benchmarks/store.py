@@ -4,8 +4,6 @@ The trials of a study are the rows of a sweep, in a file of its own that ``contr
 reads: a column for each metric, and in words why one has no value.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from controller.modes import Limited, are_within
+from go2_wbc.geometry import support_margin
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.state import Snapshot
 
@@ -26,6 +27,10 @@ SETTLED = 0.01
 """Height [m] of the base above where it goes limp below which the belly is down."""
 LYING_TILT = 0.5
 """Angle [rad] from the vertical below which a robot lies on its belly."""
+LEANING = 0.4
+"""Tilt [rad] beyond which a robot sits, or tips over, and does not stand: twice a steep slope's."""
+MOVING_SPEED = 0.3
+"""Speed [m/s] of the base beyond which a robot moves: one that stood sinks as fast after 0.1 s."""
 FOLD_TOLERANCE = 0.5
 """Angle [rad] from the tucked legs' joints that still counts as folded."""
 
@@ -111,6 +116,21 @@ def lying(snapshot: Snapshot) -> Limited:
 def is_standing(snapshot: Snapshot) -> bool:
     """Whether the robot stands still on four feet, level, at the standing height."""
     return are_within(standing(snapshot))
+
+
+def why_not_standing(snapshot: Snapshot) -> str:
+    """Why a robot that nobody balances does not stand on its feet; empty if it does."""
+    state, feet, p_com = snapshot.state, snapshot.p_world_feet[:, :2], snapshot.p_world_com[:2]
+    height, speed = base_height(snapshot), float(np.linalg.norm(state.v[:3]))
+    if height < LYING_HEIGHT:
+        return f"it lies, its base {height:.2f} m above its feet"
+    if state.tilt > LEANING:
+        return f"its trunk is tilted by {np.degrees(state.tilt):.0f} deg"
+    if raised := [leg.name for leg in LEGS if not state.feet_in_contact[leg]]:
+        return f"{' and '.join(raised)} in the air"
+    if speed > MOVING_SPEED:
+        return f"it moves at {speed:.2f} m/s"
+    return "" if support_margin(feet, p_com) > 0.0 else "its CoM is not above its feet"
 
 
 def posture_measurements(snapshot: Snapshot) -> dict[str, float]:

@@ -21,6 +21,7 @@ from controller.checks import (
     lying,
     sitting,
     standing,
+    why_not_standing,
 )
 from controller.modes import Aborted, Measurements, Mode, listed, told
 from controller.navigation import Goal
@@ -40,6 +41,8 @@ READY_TIME = 0.2
 """Time [s] that a robot is given to stand ready in walking mode."""
 HOLD_TIME = 0.4
 """Time [s] in which a robot that stands takes the exact posture."""
+LOOK_TIME = 0.03
+"""Time [s] for which a limp robot's feet are looked at: one that stands sinks by 3 mm."""
 
 
 class Pilot:
@@ -106,7 +109,19 @@ class Pilot:
             self._mode = Mode.MOVING
             tuck(self._runner)
         entry = {Mode.SITTING: Posture.SIT, Mode.LYING: Posture.LIE}.get(mode, Posture.STAND)
-        duration = HOLD_TIME if mode in (Mode.STANDING, Mode.WALKING) else 1.2
+        return self._rise(entry, HOLD_TIME if mode in (Mode.STANDING, Mode.WALKING) else 1.2)
+
+    def take_over(self) -> Measurements:
+        """Stand on the feet where they are; a robot that does not stand stays limp."""
+        if self.mode.is_upright:
+            return self.stand()
+        loop = self._loop
+        self._runner.advance_until(lambda: bool(loop.state.feet_in_contact.all()), LOOK_TIME)
+        if why_not := self._runner.between_ticks(lambda: why_not_standing(loop.snapshot)):
+            raise Aborted(f"the robot does not stand: {why_not}", self._runner.measurements())
+        return self._rise(Posture.STAND, 1.2)
+
+    def _rise(self, entry: Posture, duration: float) -> Measurements:
         self._take_posture(self._make_standing(entry, duration))
         if self._runner.settles(is_standing):
             return self._arrive(Posture.STAND)
@@ -148,7 +163,8 @@ class Pilot:
     def _make_standing(self, entry: Posture, duration: float) -> Standing:
         own = self._loop.model.profile
         make_plan = partial(rise, entry=entry, duration=duration, profile=own)
-        friction = self._walker.walking.friction
+        walking = self._walker.walking
+        friction = walking.friction if walking.has_slid else None
         return Standing(make_plan, self._loop.model, self._config.locomotion, friction)
 
     def _settle(self, posture: Posture, what: str) -> Measurements:

@@ -127,6 +127,7 @@ class Telemetry:
             p_world_com=taken[:, _COM],
             support_margin=np.full(len(rows), np.nan),
             labels=labels,
+            robot=self._model.description.profile.name,
         )
         return Samples(recording, taken[:, _FEET].reshape(-1, 4, 3))
 

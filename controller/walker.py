@@ -30,11 +30,8 @@ class Walker:
     def __init__(self, runner: Runner, config: Config) -> None:
         """Walk on ``runner``, at first with the trot."""
         self._runner, self._config = runner, config
-        self.walking = self._make(find_gait("trot"), None)
+        self.walking = Walking(runner.loop.model, find_gait("trot"), config.locomotion)
         self._envelope = self._envelope_of(self.walking)
-
-    def _make(self, gait: Gait, friction: float | None) -> Walking:
-        return Walking(self._runner.loop.model, gait, self._config.locomotion, friction)
 
     def excess(self, command: VelocityCommand) -> tuple[int, str]:
         """How far ``command`` is beyond the gait's envelope (0 if not, 2 by far), and in words."""
@@ -58,7 +55,8 @@ class Walker:
         """Stand ready to walk with ``gait``."""
         choice = self._choice(gait)
         gait = find_gait(LADDER[0] if gait == AUTO else gait)
-        walking = self._make(gait, self.walking.friction)
+        model, before = self._runner.loop.model, self.walking
+        walking = Walking(model, gait, self._config.locomotion, before.friction, before.has_slid)
         walking.choice = choice
         self._runner.engage(walking)
         self.walking = walking

@@ -225,6 +225,12 @@ class Gait:
         return bool((phase <= self.duty + TIE).all(axis=1).any())
 
     @property
+    def stands_beside_com(self) -> bool:
+        """Whether at times only the feet of one side, or of one end, stand."""
+        pairs = {frozenset(pair) for pair in ((0, 2), (1, 3), (0, 1), (2, 3))}
+        return any(frozenset(np.flatnonzero(mode)) in pairs for mode in self.schedule().modes)
+
+    @property
     def has_flight(self) -> bool:
         """Whether there are moments without a foot on the ground."""
         return not self.schedule().modes.any(axis=1).all()

@@ -1,7 +1,5 @@
 """The notebooks run from a clean kernel, say what their committed outputs say, and are small."""
 
-from __future__ import annotations
-
 import ast
 import importlib.util
 import json

@@ -193,6 +193,7 @@ class ReplayContent:
         sliders: parameters that a live page lets one choose.
         sound: an MP3 file that starts with the recording, played in step with it; empty for none.
         end_pose: where the movement shall end: x, y [m] and yaw [rad] of the frame of the feet.
+        bar: beats of a bar, and the number of the beat on which the first begins.
     """
 
     recording: Recording
@@ -204,6 +205,7 @@ class ReplayContent:
     sliders: tuple[Slider, ...] = ()
     sound: bytes = b""
     end_pose: tuple[float, float, float] | None = None
+    bar: tuple[int, int] = (4, 0)
 
     __repr__ = brief
 

@@ -1,7 +1,5 @@
 """``python -m benchmarks bridges``: ROS 2 and Unitree's protocol, measured between processes."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 

@@ -10,6 +10,7 @@ from contextlib import closing
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
+from controller.bridges.unitree import LOOPBACK
 from controller.cli.common import ExitCode, print_json_line
 from controller.cli.options import Mjcf, Numbers, dds_domain
 from go2_wbc.errors import PlantError
@@ -50,7 +51,7 @@ def ros2(
 def unitree_sim(
     *,
     domain: Annotated[int, "N", "default %(default)s", dds_domain] = 1,
-    interface: Annotated[str, "NAME", "network, default %(default)s"] = "lo",
+    interface: Annotated[str, "NAME", "network, default %(default)s"] = LOOPBACK,
     mjcf: Mjcf = None,
     friction: Annotated[float | None, "MU", "of the feet, default 0.8"] = None,
     payload: Annotated[float, "KG", "extra mass"] = 0.0,
@@ -94,7 +95,7 @@ def unitree_sim(
 
 def unitree_drive(
     *,
-    interface: Annotated[str, "NAME", "lo for a simulator"],
+    interface: Annotated[str, "NAME", f"{LOOPBACK} for a simulator"],
     domain: Annotated[int, "N", "0 robot, 1 simulator", dds_domain] = 0,
     i_have_the_remote_in_hand: Annotated[bool, "required: you can stop it"] = False,
     steps: Annotated[

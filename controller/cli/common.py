@@ -47,6 +47,7 @@ def add_parser(
     """Add the parser of the subcommand ``name``; its examples are one line each."""
     return subparsers.add_parser(
         name,
+        help=description.partition("\n")[0].replace("%", "%%"),
         description=description,
         epilog=examples_epilog(examples),
         formatter_class=argparse.RawDescriptionHelpFormatter,

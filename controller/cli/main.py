@@ -65,6 +65,7 @@ COMMANDS = tuple(
     for name, place, summary in (
         ("certify", "sweep:certify_command", "how often a motion is done in random worlds"),
         ("check", "motions:check", "can the robot do this motion?"),
+        ("completion", "completion", "what a shell needs to complete this on TAB"),
         ("dance", "dance", "a dance on the beats of a song"),
         ("demo", "demo", "stand, sit, walk, turn, high five; measured, in 3D"),
         ("doctor", "doctor", "check this installation, say what is missing"),
@@ -179,10 +180,13 @@ def _is_news(record: logging.LogRecord) -> bool:
     return is_service or record.msg != REASON
 
 
-def build_parser(program: Program, requested: str | None) -> argparse.ArgumentParser:
+def build_parser(
+    program: Program, requested: str | None, *, is_whole: bool = False
+) -> argparse.ArgumentParser:
     """The parser of a whole command line.
 
-    Only the ``requested`` subcommand is imported and adds its options; the others are listed.
+    Unless it ``is_whole``, only the ``requested`` subcommand is imported and adds its options; the
+    others are listed.
     """
     parser = argparse.ArgumentParser(
         prog=program.name,
@@ -198,7 +202,7 @@ def build_parser(program: Program, requested: str | None) -> argparse.ArgumentPa
     parser.set_defaults(run=None)
     subparsers = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND")
     for command in program.commands:
-        if command.name == requested:
+        if is_whole or command.name == requested:
             command.add_to(subparsers)
         else:
             subparsers.add_parser(command.name, help=command.summary)

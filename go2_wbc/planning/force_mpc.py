@@ -21,7 +21,7 @@ from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
 from go2_wbc.planning.footholds import foothold, nominal_feet
 from go2_wbc.planning.gait_clock import Clock
-from go2_wbc.planning.ground import ground_at, tilt
+from go2_wbc.planning.ground import ground_at, haste, tilt
 from go2_wbc.planning.mpc import INTERVAL, NODES, STEP, Horizon, solve_mpc
 from go2_wbc.planning.trunk import Command, advance_pose, pose_turn, ramp
 from go2_wbc.planning.walk import Planner, Walk
@@ -79,9 +79,10 @@ def fill_goals(s: Planner, c: Walk, command: Command) -> None:
     a, b = tilt(s.ground)
     steep = np.hypot(a, b)
     share = np.arctan(steep) / steep if steep > 0.0 else 1.0
+    linear = haste(s.ground, s.slip.friction) * config.linear_acceleration
     goals[:] = 0.0
     for k in range(NODES):
-        ramp(velocity, command, config.linear_acceleration, config.angular_acceleration, STEP)
+        ramp(velocity, command, linear, config.angular_acceleration, STEP)
         yaw += velocity[2] * STEP
         cosine, sine = np.cos(yaw), np.sin(yaw)
         goals[k, 9] = cosine * velocity[0] - sine * velocity[1]

@@ -27,11 +27,12 @@ from go2_wbc.planning.gait_clock import adapt, foot_phase, restart
 from go2_wbc.planning.ground import (
     LEAST_FRICTION,
     MOST_FRICTION,
-    ROUGH_SPEED,
     Slip,
     carry_ground,
     ground_at,
     ground_below,
+    haste,
+    is_rough,
     learn_ground,
     level_friction,
     note_stumble,
@@ -114,6 +115,7 @@ def adapt_gait(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) 
     is_thrown = thrown > speed
     speed = max(thrown, speed) + arm * abs(s.trunk.velocity[2])
     is_resting = is_zero(command) and is_settled(s.trunk)
+    s.clock.is_rough = is_rough(s.ground)
     adapt(s.clock, c.cadence, dt, speed, is_resting, is_thrown)
 
 
@@ -122,13 +124,14 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
     """Ramp velocity and pose, integrate to the place, apply the leash, correct the height."""
     trunk, config = s.trunk, c.config
     advance_pose(trunk.pose, trunk.pose_rate, config.pose, command.pose, dt)
-    ramp(trunk.velocity, command, config.linear_acceleration, config.angular_acceleration, dt)
+    linear = haste(s.ground, s.slip.friction) * config.linear_acceleration
+    ramp(trunk.velocity, command, linear, config.angular_acceleration, dt)
     follow_heading(trunk, now, config.yaw_leash, dt)
     if s.is_stepping:
         follow_position(trunk, now, config.position_leash, dt)
     else:
         rest_in_place(now, s, config.position_leash, dt)
-    carry_ground(s.ground, now, dt)
+    carry_ground(s.ground, config.rough, now, dt)
     correct_height(trunk, now, s.ground.height + c.height, dt)
 
 
@@ -146,7 +149,7 @@ def note_liftoffs(
     for leg in range(4):
         foot = s.feet[leg].contact
         if foot.was_stance and not stance[leg]:
-            begin_swing(s.feet[leg].swing, now.p_world_feet[leg], s.ground)
+            begin_swing(s.feet[leg].swing, now.p_world_feet[leg], s.ground, c.config.rough)
         if not stance[leg]:
             foot.is_awaited = False
             is_middle = abs(progress[leg] - 0.5) <= MID_SWING + TIE
@@ -213,7 +216,7 @@ def plan(
     """
     dt = time - s.time
     s.time = time
-    slow_down(s.ground, command.velocity)
+    slow_down(s.ground, c.config.rough, command.velocity)
     advance_phase(now, s, c, command, dt)
     integrate(now, s, c, command, dt)
     if s.is_stepping:
@@ -228,7 +231,8 @@ def plan(
         foot, p = s.feet[leg].contact, now.p_world_feet[leg]
         above = p[2] - c.foot_radius - ground_at(s.ground, p[0], p[1])
         stands[leg] = follow_contact(foot, above, contact[leg], stance[leg], progress[leg], dt)
-    observe_slip(s.slip, now, contact, tau, stands, s.is_stepping, dt)
+    steps, beside = s.is_stepping, c.stands_beside_com
+    observe_slip(s.slip, now, contact, tau, stands, steps, beside, dt)
     note_liftoffs(now, s, c, contact, stance, progress)
     target.friction = level_friction(s.ground, s.slip.friction, LEAST_FRICTION)
     fill_body(s.trunk, s.ground, c.height, target)
@@ -250,12 +254,15 @@ class LocomotionPlanner:
         self.change_gait(gait)
 
     @typed()
-    def start(self, snapshot: Snapshot, friction: float | None = None) -> None:
+    def start(
+        self, snapshot: Snapshot, friction: float | None = None, has_slid: bool = True
+    ) -> None:
         """Begin from the measured state, standing.
 
         Args:
             snapshot: of this tick.
             friction: of the ground, as it is known; None if nothing is.
+            has_slid: whether a foot has shown that, and not only that it is at least as high.
         """
         known = self._config.ground_friction if friction is None else friction
         if known <= 0.0:
@@ -272,7 +279,9 @@ class LocomotionPlanner:
             trunk=Trunk(yaw=snapshot.state.yaw, position=snapshot.p_world_com[:2]),
             rest=Rest(place=snapshot.p_world_com[:2], middle=snapshot.p_world_feet.mean(axis=0)),
             ground=ground_below(snapshot, self._model.foot_radius),
-            slip=Slip(friction=min(known, MOST_FRICTION)),
+            slip=Slip(
+                friction=min(known, MOST_FRICTION), has_slid=friction is not None and has_slid
+            ),
             feet=feet,
             planned=PlannedForces(next=-np.inf),
         )
@@ -296,7 +305,8 @@ class LocomotionPlanner:
     def is_slowed(self) -> bool:
         """Whether rough ground keeps the robot slower than it is told."""
         x, y = self._state.trunk.velocity[:2].tolist()
-        return bool(self._state.ground.rough_time > 0.0 and np.hypot(x, y) > ROUGH_SPEED - TIE)
+        is_fast = bool(np.hypot(x, y) > self._config.rough.speed - TIE)
+        return is_fast and self._state.ground.rough_way > 0.0
 
     @property
     def is_stepping(self) -> bool:
@@ -312,6 +322,11 @@ class LocomotionPlanner:
     def friction(self) -> float:
         """Of the ground, as far as it has been shown; 0 before ``start``."""
         return float(self._state.slip.friction)
+
+    @property
+    def has_slid(self) -> bool:
+        """Whether a foot has, and has shown that friction."""
+        return bool(self._state.slip.has_slid)
 
     @typed(late=True)
     def square_up(self, snapshot: Snapshot) -> bool:

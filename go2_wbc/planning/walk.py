@@ -11,7 +11,7 @@ from go2_wbc.contacts import Gait
 from go2_wbc.errors import ConfigError
 from go2_wbc.planning import ground, swing
 from go2_wbc.planning.gait_clock import Cadence, Clock
-from go2_wbc.planning.ground import Ground, Slip
+from go2_wbc.planning.ground import Ground, RoughConfig, Slip
 from go2_wbc.planning.mpc import Horizon, MpcConfig
 from go2_wbc.planning.swing import FootContact, Swing, SwingConfig
 from go2_wbc.planning.trunk import PoseConfig, Trunk
@@ -63,7 +63,8 @@ class LocomotionConfig:
         height: CoM height [m] above the ground.
         compression: by which feet under the trunk's weight are pressed flat, or into the ground,
             [m]: in MuJoCo 1 to 6 mm, by the friction of the joints.
-        linear_acceleration: greatest change of the commanded velocity [m/s^2].
+        linear_acceleration: greatest change of the commanded velocity [m/s^2] on a friction of
+            0.6, the most that is believed; on less it is as much less (``ground.haste``).
         angular_acceleration: greatest change of the commanded turning rate [rad/s^2].
         velocity_feedback: foothold offset [s] per velocity error.
         stride_margin: speed [m/s] that the robot may have beyond the commanded one before the
@@ -84,11 +85,12 @@ class LocomotionConfig:
         swing: shape of the swing.
         mpc: planning of the forces ahead.
         pose: how a new pose of the trunk is approached.
+        rough: how it walks on rough ground.
     """
 
     height: float = 0.29
     compression: float = 0.004
-    linear_acceleration: float = 1.5
+    linear_acceleration: float = 5.0
     angular_acceleration: float = 4.0
     velocity_feedback: float = 0.12
     stride_margin: float = 0.4
@@ -104,6 +106,7 @@ class LocomotionConfig:
     swing: SwingConfig = field(default_factory=SwingConfig)
     mpc: MpcConfig = field(default_factory=MpcConfig)
     pose: PoseConfig = field(default_factory=PoseConfig)
+    rough: RoughConfig = field(default_factory=RoughConfig)
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a height that the legs have not, or forces without a range."""
@@ -136,6 +139,7 @@ class Walk:
         gravity: [m/s^2].
         foot_radius: [m].
         p_base_feet_nominal: places of the feet below the hips, from the base [m].
+        stands_beside_com: whether at times only the feet of one side, or of one end, stand.
     """
 
     config: LocomotionConfig
@@ -145,18 +149,20 @@ class Walk:
     gravity: float
     foot_radius: float
     p_base_feet_nominal: Float[np.ndarray, "4 3"]
+    stands_beside_com: bool
 
     @staticmethod
     def of(model: RobotModel, gait: Gait, config: LocomotionConfig) -> Walk:
         """Those of a robot that walks with ``gait``."""
         return Walk(
             replace(config, swing=config.swing.at_most(gait.apex)),
-            Cadence.of(gait),
+            Cadence.of(gait, config.rough),
             config.height_on_feet,
             model.mass,
             model.gravity,
             model.foot_radius,
             model.p_base_feet_nominal,
+            gait.stands_beside_com,
         )
 
 

@@ -1,18 +1,22 @@
 """Ground that a simulated plant can stand the robot on, as plain data.
 
-The robot starts at the origin, and is told nothing of it. Whatever has a direction rises or begins
-ahead of it, along the world's x axis.
+The robot starts at the origin, on ground of height 0, and is told nothing of it. Whatever has a
+direction rises or begins ahead of it, along the world's x axis; who turns the robot at its start
+goes that way aslant. Pits reach down to a floor below 0, and cut the ground into banks.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Rule, ranged
 
 STEEPEST = 0.8
@@ -42,6 +46,17 @@ class Block:
     pitch: float = 0.0
     friction: float | None = None
 
+    @staticmethod
+    def slab(start: float, length: float, bottom: float, top: float) -> Block:
+        """A level one across the way: where it begins and how long it is [m], and its heights."""
+        centre = (start + 0.5 * length, 0.0, 0.5 * (bottom + top))
+        return Block(centre, (0.5 * length, HALF_WIDTH, 0.5 * (top - bottom)))
+
+    def shifted(self, ahead: float) -> Block:
+        """The same so much [m] farther ahead."""
+        x, y, z = self.centre
+        return replace(self, centre=(x + ahead, y, z))
+
 
 class Terrain(ABC):
     """What the ground is like, where it is not a level floor."""
@@ -53,9 +68,31 @@ class Terrain(ABC):
         """Angle [rad] by which the whole floor is turned about y; negative rises ahead."""
         return 0.0
 
+    @property
+    def floor_height(self) -> float:
+        """Of the whole floor [m], 0 or less."""
+        return 0.0
+
+    @property
+    def end(self) -> float:
+        """Where [m] ahead the ground has height 0 again for good; infinite if nowhere."""
+        return math.inf
+
+    @property
+    def pits(self) -> tuple[tuple[float, float], ...]:
+        """From where to where [m] ahead the ground of height 0 is missing, in order."""
+        return ()
+
     @abstractmethod
     def blocks(self) -> tuple[Block, ...]:
-        """What lies on the floor."""
+        """What lies on the ground, or stands on the floor of the pits."""
+
+    def banks(self) -> tuple[Block, ...]:
+        """The ground between the pits, where there are any."""
+        edges = [-PLATFORM, *(x for pit in self.pits for x in pit)]
+        edges.append(edges[-1] + PLATFORM)
+        spans = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if a < b]
+        return tuple(Block.slab(a, b - a, self.floor_height, 0.0) for a, b in spans if self.pits)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +139,12 @@ class Boxes(Terrain):
         )
 
 
+UP, DOWN, BOTH = "up", "down", "both"
+"""Ways of stairs."""
+TREAD = 0.04
+"""Thickness [m] of a step with an open riser."""
+
+
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE)
 class Stairs(Terrain):
@@ -109,25 +152,85 @@ class Stairs(Terrain):
 
     Attributes:
         height: of a step [m].
-        count: of the steps.
+        count: of the steps, of each flight.
         depth: of a step [m]; 0.3 is that of a flight of stairs in a house.
         start: distance of the first one from the origin [m].
+        way: "up", "down" from the ground at the start, or "both", up and down again.
+        landing: length of the level ground behind the last step up [m].
+        is_open: whether there are treads only, with nothing below them.
     """
 
     height: float = 0.08
     count: int = 4
     depth: float = 0.3
     start: float = 0.8
+    way: str = UP
+    landing: float = PLATFORM
+    is_open: bool = False
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for another way."""
+        if self.way not in (UP, DOWN, BOTH):
+            raise ConfigError(unknown_name("Stairs.way", str(self.way), (UP, DOWN, BOTH)))
+
+    @property
+    def floor_height(self) -> float:
+        """See ``Terrain.floor_height``."""
+        return -self.count * self.height if self.way == DOWN else 0.0
+
+    @property
+    def pits(self) -> tuple[tuple[float, float], ...]:
+        """See ``Terrain.pits``."""
+        return ((self.start, math.inf),) if self.way == DOWN else ()
+
+    @property
+    def end(self) -> float:
+        """See ``Terrain.end``."""
+        flights = 2 * (self.count - 1) * self.depth
+        return self.start + flights + self.landing if self.way == BOTH else math.inf
 
     def blocks(self) -> tuple[Block, ...]:
-        """One for each step, the last one with the platform."""
+        """One for each step, the last one up with the landing."""
+        up = range(1, self.count + 1)
+        tops = {UP: (*up,), DOWN: (*(-n for n in up[:-1]),), BOTH: (*up, *up[-2::-1])}[self.way]
         blocks = []
-        for n in range(self.count):
-            half = 0.5 * (self.depth if n < self.count - 1 else PLATFORM)
-            top = 0.5 * (n + 1) * self.height
-            centre = (self.start + n * self.depth + half, 0.0, top)
-            blocks.append(Block(centre, (half, HALF_WIDTH, top)))
+        for n, top in enumerate(tops):
+            length = self.landing if top == self.count else self.depth
+            behind = self.landing - self.depth if n >= self.count else 0.0
+            height = top * self.height
+            bottom = height - TREAD if self.is_open else self.floor_height
+            x = self.start + n * self.depth + behind
+            blocks.append(Block.slab(x, length, bottom, height))
         return tuple(blocks)
+
+
+@dataclass(frozen=True, slots=True)
+@ranged(POSITIVE)
+class Blocks(Terrain):
+    """Blocks across the way, one behind the other.
+
+    Attributes:
+        height, length: of each [m].
+        gap: length [m] of the ground between two.
+        count: of them.
+        start: distance of the first one from the origin [m].
+    """
+
+    height: float = 0.1
+    length: float = 1.0
+    gap: float = 1.0
+    count: int = 4
+    start: float = 0.8
+
+    @property
+    def end(self) -> float:
+        """See ``Terrain.end``."""
+        return self.start + self.count * (self.length + self.gap) - self.gap
+
+    def blocks(self) -> tuple[Block, ...]:
+        """All of them."""
+        starts = [self.start + n * (self.length + self.gap) for n in range(self.count)]
+        return tuple(Block.slab(x, self.length, 0.0, self.height) for x in starts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,6 +269,11 @@ class Ramp(Terrain):
     length: float = 1.5
     start: float = 0.8
 
+    @property
+    def end(self) -> float:
+        """See ``Terrain.end``."""
+        return self.start + 3.0 * self.length
+
     def blocks(self) -> tuple[Block, ...]:
         """The way up, the top and the way down."""
         rise = self.length * math.tan(self.angle)
@@ -182,6 +290,197 @@ class Ramp(Terrain):
                 (x + 2 * self.length - aside, 0.0, z), (half, HALF_WIDTH, thick), pitch=self.angle
             ),
         )
+
+
+STRIPS = 16
+"""Flat strips of which a wave is made."""
+
+
+@dataclass(frozen=True, slots=True)
+@ranged(POSITIVE)
+class Waves(Terrain):
+    """Waves across the way, from valley to valley.
+
+    They are made of flat strips: on MuJoCo's height fields feet are pinned between two prisms.
+
+    Attributes:
+        height: of a crest over a valley [m].
+        length: of a wave [m].
+        count: of them.
+        start: distance of the first one from the origin [m].
+    """
+
+    height: float = 0.08
+    length: float = 1.0
+    count: int = 5
+    start: float = 0.8
+
+    @property
+    def end(self) -> float:
+        """See ``Terrain.end``."""
+        return self.start + self.count * self.length
+
+    def blocks(self) -> tuple[Block, ...]:
+        """The strips."""
+        x = np.linspace(0.0, self.count * self.length, self.count * STRIPS + 1)
+        z = 0.5 * self.height * (1.0 - np.cos(2.0 * np.pi * x / self.length))
+        ends = np.column_stack([self.start + x, z]).tolist()
+        return tuple(_strip(a, b) for a, b in itertools.pairwise(ends))
+
+
+def _strip(begin: Sequence[float], end: Sequence[float], thickness: float = 0.3) -> Block:
+    """A flat block across the way, the upper side of which leads from one (x, z) to another."""
+    way, rise = end[0] - begin[0], end[1] - begin[1]
+    angle, half = math.atan2(rise, way), 0.5 * thickness
+    x = 0.5 * (begin[0] + end[0]) + half * math.sin(angle)
+    z = 0.5 * (begin[1] + end[1]) - half * math.cos(angle)
+    return Block((x, 0.0, z), (0.5 * math.hypot(way, rise), HALF_WIDTH, half), pitch=-angle)
+
+
+class _Pit(Terrain):
+    """A pit across the way."""
+
+    __slots__ = ()
+    depth: float
+    start: float
+
+    @property
+    def floor_height(self) -> float:
+        """See ``Terrain.floor_height``."""
+        return -self.depth
+
+    @property
+    def pits(self) -> tuple[tuple[float, float], ...]:
+        """See ``Terrain.pits``."""
+        return ((self.start, self.end),)
+
+
+@dataclass(frozen=True, slots=True)
+@ranged(POSITIVE, uneven=NOT_NEGATIVE, seed=NOT_NEGATIVE)
+class Stones(_Pit):
+    """Square stepping stones in a pit.
+
+    Attributes:
+        size: side of a stone [m].
+        gap: between two of them, ahead and aside [m].
+        count: of rows of stones, ahead.
+        depth: of the pit [m].
+        uneven: by which a stone may be lower [m]; each is drawn evenly.
+        seed: of that.
+        start: where the pit begins, from the origin [m].
+    """
+
+    size: float = 0.25
+    gap: float = 0.1
+    count: int = 6
+    depth: float = 0.4
+    uneven: float = 0.0
+    seed: int = 0
+    start: float = 0.8
+
+    @property
+    def end(self) -> float:
+        """See ``Terrain.end``."""
+        return self.start + self.count * (self.size + self.gap) + self.gap
+
+    def blocks(self) -> tuple[Block, ...]:
+        """The stones, in rows over 2 m."""
+        rng, pitch = np.random.default_rng(self.seed), self.size + self.gap
+        aside, half = round(1.0 / pitch), 0.5 * self.size
+        stones = []
+        for ahead in range(self.count):
+            for left in range(-aside, aside + 1):
+                x = self.start + self.gap + ahead * pitch + half
+                tall = 0.5 * (self.depth - float(rng.uniform(0.0, self.uneven)))
+                stones.append(Block((x, left * pitch, tall - self.depth), (half, half, tall)))
+        return tuple(stones)
+
+
+@dataclass(frozen=True, slots=True)
+@ranged(POSITIVE)
+class Gap(_Pit):
+    """A gap across the way.
+
+    Attributes:
+        length: of it [m].
+        depth: of it [m].
+        start: distance from the origin [m].
+    """
+
+    length: float = 0.2
+    depth: float = 0.4
+    start: float = 0.8
+
+    @property
+    def end(self) -> float:
+        """See ``Terrain.end``."""
+        return self.start + self.length
+
+    def blocks(self) -> tuple[Block, ...]:
+        """None."""
+        return ()
+
+
+@dataclass(frozen=True, slots=True)
+class Course(Terrain):
+    """Several terrains, one behind the other.
+
+    Attributes:
+        parts: each with its own start, from the end of the one before; each must have an end.
+    """
+
+    parts: tuple[Terrain, ...]
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a part without an end, or for none."""
+        if not self.parts or not all(math.isfinite(part.end) for part in self.parts):
+            raise ConfigError(f"Course.parts must be terrains with an end, got {self.parts!r}")
+
+    @staticmethod
+    def drawn(seed: int, height: float = 0.12, angle: float = 0.3, length: float = 12.0) -> Course:
+        """A random one: stairs, blocks, ramps and waves, until it is ``length`` [m] long.
+
+        Each is drawn between half of the ``height`` of a step [m] or the ``angle`` of a slope [rad]
+        and all of it; waves may be as high as a step.
+        """
+        rng, parts, total = np.random.default_rng(seed), [], 0.0
+        while total < length:
+            kind, share = int(rng.integers(4)), float(rng.uniform(0.5, 1.0))
+            step = share * height
+            part: Terrain = (
+                Stairs(step, 3, 0.31, way=BOTH, landing=1.0),
+                Blocks(step, count=1),
+                Ramp(share * angle, length=1.0),
+                Waves(step, count=2),
+            )[kind]
+            parts.append(part)
+            total += part.end
+        return Course(tuple(parts))
+
+    @property
+    def floor_height(self) -> float:
+        """See ``Terrain.floor_height``."""
+        return min(part.floor_height for part in self.parts)
+
+    @property
+    def end(self) -> float:
+        """See ``Terrain.end``."""
+        return sum(part.end for part in self.parts)
+
+    def _shifted(self) -> Iterator[tuple[float, Terrain]]:
+        x = 0.0
+        for part in self.parts:
+            yield x, part
+            x += part.end
+
+    @property
+    def pits(self) -> tuple[tuple[float, float], ...]:
+        """See ``Terrain.pits``."""
+        return tuple((x + a, x + b) for x, part in self._shifted() for a, b in part.pits)
+
+    def blocks(self) -> tuple[Block, ...]:
+        """Those of all parts."""
+        return tuple(block.shifted(x) for x, part in self._shifted() for block in part.blocks())
 
 
 @dataclass(frozen=True, slots=True)

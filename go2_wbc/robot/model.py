@@ -125,7 +125,6 @@ class RobotModel:
         Pinocchio. The former takes the robot as it is at the first call.
 
         Args:
-            state: measured.
             payload: what the trunk carries beside what the model has.
         """
         if not state.q.flags.writeable:  # compiled code takes what it may write to

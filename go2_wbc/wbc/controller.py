@@ -192,7 +192,11 @@ class WholeBodyController:
 
     @typed(late=True)
     def formulate(self, snapshot: Snapshot, reference: Reference) -> Problem:
-        """The QP of this tick."""
+        """The QP of this tick.
+
+        Raises:
+            ConfigError: for a task or constraint whose rows do not fit.
+        """
         task_rows = [task.rows(snapshot, reference) for task in self.tasks]
         equality_rows = [item.rows(snapshot, reference) for item in self.equalities]
         bounds = [item.bounds(snapshot, reference) for item in self.inequalities]

@@ -17,7 +17,7 @@ from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import RobotProfile
+from go2_wbc.robot.profile import GO2, RobotProfile
 from go2_wbc.world import World
 from motions.authoring import Motion
 from motions.batch_kinematics import centres_of_mass
@@ -51,12 +51,14 @@ class CheckedMotion:
         report: what the check says.
         path: the movement of the whole robot, in the frame of the motion.
         forces: contact forces and torques along it.
+        robot: name of the profile of the robot that was judged.
     """
 
     plan: MotionPlan
     report: FeasibilityReport
     path: Trajectory
     forces: Forces
+    robot: str = GO2
 
     _repr_html_ = inline_html
     __repr__ = brief
@@ -83,6 +85,7 @@ class CheckedMotion:
                 _label(float(t), stands, spans)
                 for t, stands in zip(path.times, path.stance, strict=True)
             ),
+            robot=self.robot,
         )
 
 
@@ -256,7 +259,7 @@ class FeasibilityChecker:
             departures=() if solved is None else departures(solved, model),
             world=self.world,
         )
-        return CheckedMotion(plan, report, path, forces)
+        return CheckedMotion(plan, report, path, forces, model.description.profile.name)
 
     def _judged(self, case: Case, plan: MotionPlan) -> list[Series]:
         """Every check, causes before what follows from them."""

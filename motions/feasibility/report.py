@@ -229,7 +229,11 @@ class FeasibilityReport:
         return fitted().probability(margins)
 
     def raise_if_infeasible(self) -> None:
-        """Raise MotionInfeasible with the failures, if there are any."""
+        """Do nothing if it is feasible.
+
+        Raises:
+            MotionInfeasible: if it is not; carries the failures.
+        """
         if self.failures:
             raise MotionInfeasible(self.motion, self.failures)
 

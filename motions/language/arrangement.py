@@ -71,7 +71,11 @@ class Arrangement(TimelineData):
         return replace(self, cursor=self.last_start, floor=self.cursor)
 
     def at(self, t: float) -> Self:
-        """Put the cursor ``t`` seconds (beats) after the start of the motion."""
+        """Put the cursor ``t`` seconds (beats) after the start of the motion.
+
+        Raises:
+            TimelineError: for a time before the start, or none.
+        """
         if not (is_number(t) and t >= 0.0):
             raise TimelineError(f"at() needs a time of 0 s or later, got {t!r}")
         return replace(self, cursor=self.clock.at(t))
@@ -81,6 +85,9 @@ class Arrangement(TimelineData):
 
         Before a foot is raised the trunk then moves aside in ``shift_time`` beats; by default in
         the fewest whole beats that are no shorter than the timeline's ``shift_time``.
+
+        Raises:
+            TimelineError: for a tempo that is out of range.
         """
         if not SLOWEST <= positive("bpm", beats_per_minute) <= FASTEST:
             raise TimelineError(
@@ -137,14 +144,22 @@ class Arrangement(TimelineData):
         return line
 
     def together(self, *others: TimelineData) -> Self:
-        """Do all of ``others`` at the same time, from the cursor on; they may not share a part."""
+        """Do all of ``others`` at the same time, from the cursor on; they may not share a part.
+
+        Raises:
+            TimelineError: for what is no timeline, or where two move the same part.
+        """
         line, start = self, self.cursor
         for other in _written("together()", others):
             line = line._joined(other, start)
         return replace(line, cursor=max([start, *(start + other.end for other in others)]))
 
     def repeat(self, times: int) -> Self:
-        """This whole motion, ``times`` times one after another; it must end as it began."""
+        """This whole motion, ``times`` times one after another; it must end as it began.
+
+        Raises:
+            TimelineError: for a number below 1, another end than start, or too long a motion.
+        """
         if isinstance(times, bool) or not isinstance(times, int) or not 1 <= times <= LARGEST:
             raise TimelineError(f"repeat() needs a whole number of 1 or more, got {times!r:.80}")
         self._require_length(times * max(self.end, SHORTEST))
@@ -157,7 +172,11 @@ class Arrangement(TimelineData):
     # --- made into another ----------------------------------------------------------------
 
     def scale_time(self, factor: float) -> Self:
-        """The same motion, ``factor`` times as long: 2 is half as fast."""
+        """The same motion, ``factor`` times as long: 2 is half as fast.
+
+        Raises:
+            TimelineError: for a factor that is not above 0.
+        """
         longer = positive("factor", factor)
         keys = tuple(key.slower(longer) for key in self.keys)
         return self._retimed(keys, lambda t: longer * t, longer)
@@ -166,6 +185,9 @@ class Arrangement(TimelineData):
         """The same motion with all offsets of trunk and feet multiplied: 0.5 is half as large.
 
         Postures and the angles of ``leg`` and ``joint`` are no offsets, and stay.
+
+        Raises:
+            TimelineError: for a factor that is not above 0.
         """
         share = positive("amplitude", amplitude)
         return replace(self, keys=tuple(key.scaled(share) for key in self.keys))
@@ -174,6 +196,9 @@ class Arrangement(TimelineData):
         """The same motion, its moves over the feet that stay, and back, ``factor`` times as long.
 
         What follows comes later; what goes on meanwhile takes as much longer. See ``shift_time``.
+
+        Raises:
+            TimelineError: for a factor that is not above 0.
         """
         longer = positive("factor", factor) - 1.0
         shifts = [

@@ -1,7 +1,5 @@
 """The gallery shows every motion of the library as it is; the README's film is small and loops."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import replace
 from pathlib import Path

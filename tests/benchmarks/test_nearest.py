@@ -1,7 +1,5 @@
 """The benchmark of nearest motions: what is refused, what is measured, a sample of its row."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -12,7 +10,6 @@ from scipy.spatial.transform import Rotation
 from benchmarks import nearest
 from benchmarks.nearest import KINDS, STUDIES, off_written, refused_motion
 from go2_wbc.reference import Anchor
-from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from motions import FeasibilityChecker, Timeline
 from motions.postures import standing_feet
@@ -21,11 +18,6 @@ from tests.solver import needs_solver
 
 SAMPLE = 1006
 """Two diagonal feet; one of the seeds that were worked with, not of those that are judged."""
-
-
-@pytest.fixture(scope="module")
-def checker() -> FeasibilityChecker:
-    return FeasibilityChecker(RobotModel())
 
 
 def test_seeds_give_every_kind_in_turn_and_the_check_refuses_each(

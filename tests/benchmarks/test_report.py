@@ -1,7 +1,5 @@
 """The report counts honestly: means, worst seeds, falls."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import math
@@ -90,8 +88,8 @@ def test_the_table_fits_80_columns_and_names_the_fallen_seed() -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        *("balance", "behaviour", "dance", "dynamic_motions", "locomotion"),
-        *("nearest", "qp_infeasibility", "steps"),
+        *("balance", "behaviour", "bridges.command", "combined", "dance", "faults", "locomotion"),
+        *("adversary", "nearest", "qp_infeasibility", "sequences"),
     ],
 )
 def test_every_real_metric_fits_the_table_and_has_its_own_name(name: str) -> None:

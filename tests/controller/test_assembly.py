@@ -1,7 +1,5 @@
 """A controller is put together whole or not at all."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import threading

@@ -1,10 +1,5 @@
 """Bad input is refused at once, by an error that says what was wrong and what is valid."""
 
-from __future__ import annotations
-
-import os
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from math import inf, nan
 from pathlib import Path
@@ -14,8 +9,7 @@ import pytest
 from controller import GO2Controller, Mode
 from go2_wbc.errors import CommandError, ConfigError
 from tests.controller.plants import StillPlant
-
-ROOT = Path(__file__).resolve().parents[2]
+from tests.pages import run_python
 
 Call = Callable[[GO2Controller], object]
 
@@ -142,14 +136,7 @@ go2.wait(1)
 """
 
 
-def test_values_of_a_wrong_type_are_refused_by_errors_of_our_own() -> None:
+def test_values_of_a_wrong_type_are_refused_by_errors_of_our_own(tmp_path: Path) -> None:
     # In a process of its own: under pytest the run-time type checks would refuse them first.
-    done = subprocess.run(
-        [sys.executable, "-c", WRONG_TYPES],
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run_python(WRONG_TYPES, tmp_path)
     assert done.returncode == 0, done.stderr

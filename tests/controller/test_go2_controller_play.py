@@ -1,7 +1,5 @@
 """``play`` does nothing twice, tells how far a plan is from what was written, and may ask first."""
 
-from __future__ import annotations
-
 from importlib import import_module
 
 import pytest

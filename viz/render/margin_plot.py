@@ -43,7 +43,6 @@ def export_plot(verdict: Verdict, path: Path, *, title: str) -> Path:
     Args:
         verdict: what a check says.
         path: file to write, ``.svg``, ``.png`` or ``.pdf``.
-        title: name of the motion.
 
     Raises:
         ConfigError: for a path that cannot be written, or a verdict without a curve.

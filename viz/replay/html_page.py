@@ -43,7 +43,8 @@ def export_html(shown: Recording | ReplayContent, path: Path, *, title: str) -> 
 
 def replay_html(shown: Recording | ReplayContent, *, title: str) -> str:
     """The page of ``export_html`` as text; raises as it does, but for the path."""
-    page = page_text(title, scene_text(), content_text(checked_content(shown), title))
+    content = checked_content(shown)
+    page = page_text(title, scene_text(content.recording), content_text(content, title))
     if (size := len(page.encode())) > PAGE_LIMIT:
         raise ConfigError(
             f"the page would have {size} bytes, limit {PAGE_LIMIT}; record a shorter run"

@@ -78,7 +78,7 @@ class PreviewServer(ThreadingHTTPServer):
                 drawn.
         """
         self._title, self.on_values = title, on_values
-        self._scene = scene_text()
+        self._scene = scene_text(content.recording)
         self._changed = threading.Condition()
         self._is_open = True
         self._pack(content)

@@ -222,8 +222,9 @@ def add_floor(spec: mujoco.MjSpec) -> None:
 
 
 def _add_terrain(spec: mujoco.MjSpec, terrain: Terrain, friction: float) -> None:
-    spec.geom(FLOOR).quat = _quaternion(0.0, terrain.floor_pitch)
-    for index, block in enumerate(terrain.blocks()):
+    floor = spec.geom(FLOOR)
+    floor.quat, floor.pos = _quaternion(0.0, terrain.floor_pitch), [0.0, 0.0, terrain.floor_height]
+    for index, block in enumerate((*terrain.blocks(), *terrain.banks())):
         mu = friction if block.friction is None else block.friction
         spec.worldbody.add_geom(
             name=f"box{index}",

@@ -22,7 +22,7 @@ from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN, bin_forces, read_joints
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
 from go2_wbc.plant.mujoco.pushes import Pushes
-from go2_wbc.plant.mujoco.settling import LYING_DAMPING, settle
+from go2_wbc.plant.mujoco.settling import settle
 from go2_wbc.plant.mujoco.setup import PlantSetup, SavedPhysics, prepare
 from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors, SensorNoise
 from go2_wbc.plant.terrain import Terrain
@@ -49,6 +49,8 @@ class MujocoPlant(Plant):
 
     Args:
         mjcf: a user's own MJCF or scene of it; ``None`` builds the model from the URDF.
+        keyframe: name of the one of ``mjcf`` that it starts in instead of lying: its joints are
+            held there until it rests. ``GO2Controller.take_over`` goes on from a stance.
         timestep: physics step [s]; overrides the one of ``mjcf``.
         control_period: seconds per ``write``, an integer multiple of ``timestep``.
         friction: sliding friction coefficient; ``None`` is 0.8, or what ``mjcf`` says. With
@@ -73,6 +75,7 @@ class MujocoPlant(Plant):
         delay: time [s] after which a command acts, rounded to whole control periods.
 
     Raises:
+        ClosedError: from all calls, once it is closed.
         ConfigError: for a value that is out of range.
         ModelMismatch: if ``mjcf`` cannot be read or lacks something; names all of it.
         DescriptionError: if the robot's files are missing or broken.
@@ -103,6 +106,7 @@ class MujocoPlant(Plant):
         robot: str = GO2,
         visuals: bool = False,
         delay: float = 0.0,
+        keyframe: str | None = None,
     ) -> None:
         if sensors not in SENSORS:
             raise ConfigError(unknown_name("sensors", sensors, SENSORS))
@@ -124,6 +128,7 @@ class MujocoPlant(Plant):
             visuals=visuals,
             delay=delay,
             seed=seed,
+            keyframe=keyframe,
         )
         start_rng, self._rng = np.random.default_rng(seed).spawn(2)
         # MuJoCo's warnings would otherwise go to a file in the working directory.
@@ -131,6 +136,7 @@ class MujocoPlant(Plant):
         self._model, self._layout, self._motor, self._description = prepare(setup)
         self._data = mujoco.MjData(self._model)
         self.robot = self._description.profile.name
+        self.model_file = str(Path(mjcf or urdf or "").absolute()) if mjcf or urdf else ""
         if mjcf is not None and joint_dynamics is None:  # of what is built here nobody is told
             self.joint_damping = tuple(self._model.dof_damping[self._layout.joint_v].tolist())
         self._noise = (noise or SensorNoise()) if sensors == "noisy" else None
@@ -146,12 +152,12 @@ class MujocoPlant(Plant):
         self._R_world_base = data.xmat[layout.base].reshape(3, 3)
         self._warnings = data.warning.number
         self._bind_kernels()
-        settle(self._model, data, layout, setup, start_rng)
-        # One period in the lying state, so that the first read has forces and torques.
+        resting = settle(self._model, data, layout, setup, start_rng)
+        # One period in the resting state, so that the first read has forces and torques.
         self._senses: Proprioception | None = None
         self._state: RobotState | None = None
         self._imu: ImuSample | None = None
-        self.write(JointCommand.damping(LYING_DAMPING))
+        self.write(resting)
         self._ticks, self._data.time = 0, 0.0
         if sensors == "imu":
             errors = errors or SensorErrors()

@@ -62,6 +62,7 @@ class PlantSetup:
     visuals: bool
     delay: float
     seed: int
+    keyframe: str | None
 
     def __post_init__(self) -> None:
         for name in ("mjcf", "urdf"):
@@ -79,6 +80,8 @@ class PlantSetup:
                 f"control_period must be an integer multiple of timestep: "
                 f"{self.control_period!r} s is {ratio:.6g} times {self.timestep!r} s"
             )
+        if self.keyframe is not None and (self.mjcf is None or self.initial_yaw):
+            raise ConfigError("keyframe needs an mjcf that has it, and says the initial_yaw, too")
         if self.mjcf is not None and self.terrain is not None:
             raise ConfigError("terrain is only for the built model; put it into the mjcf instead")
 

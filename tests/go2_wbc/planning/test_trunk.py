@@ -1,7 +1,5 @@
 """The trunk's way: its pose while walking, and its reference on a slope."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

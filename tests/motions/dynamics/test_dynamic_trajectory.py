@@ -1,7 +1,5 @@
 """A plan survives a file; what is no plan is refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

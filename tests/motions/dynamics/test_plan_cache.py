@@ -1,7 +1,5 @@
 """A plan is solved once, whatever happens to the folder that keeps it."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A search leaves nothing behind, and goes on until a plan turns as it was asked to."""
 
-from __future__ import annotations
-
 import gc
 import logging
 import math

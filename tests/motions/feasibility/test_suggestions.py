@@ -1,7 +1,5 @@
 """Suggestions: the least change of each kind, and what is pasted is what was checked."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

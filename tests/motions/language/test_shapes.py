@@ -1,7 +1,5 @@
 """Paths through points, gaze, single joints, own easing, and whole motions changed."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

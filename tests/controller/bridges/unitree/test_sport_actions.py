@@ -1,7 +1,5 @@
 """The sport service on a robot that obeys the test: order and codes of answers. Needs no DDS."""
 
-from __future__ import annotations
-
 import json
 import threading
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """The built MuJoCo model is the URDF, number by number."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -19,11 +17,25 @@ from benchmarks.model import (
     random_sample,
     relative_errors,
 )
-from go2_wbc.errors import DescriptionError
+from go2_wbc.errors import ConfigError, DescriptionError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.model import PAYLOAD_BODY, JointDynamics
-from go2_wbc.plant.terrain import Boxes, Patch, Ramp, Slope, Stairs, Terrain
+from go2_wbc.plant.terrain import (
+    BOTH,
+    DOWN,
+    Blocks,
+    Boxes,
+    Course,
+    Gap,
+    Patch,
+    Ramp,
+    Slope,
+    Stairs,
+    Stones,
+    Terrain,
+    Waves,
+)
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import JointCommand
@@ -189,6 +201,19 @@ STEEP = 0.25
     ("terrain", "heights"),
     [
         (Stairs(0.08, 3, 0.3, 0.9), {0.85: 0.0, 0.95: 0.08, 1.25: 0.16, 1.55: 0.24, 9.0: 0.24}),
+        (
+            Stairs(0.1, 2, 0.3, 0.9, BOTH, landing=1.0),
+            {0.85: 0.0, 0.95: 0.1, 1.25: 0.2, 2.15: 0.2, 2.25: 0.1, 2.45: 0.1, 2.55: 0.0},
+        ),
+        (Stairs(0.1, 2, 0.3, 0.9, DOWN), {-1.0: 0.0, 0.85: 0.0, 0.95: -0.1, 1.25: -0.2, 9.0: -0.2}),
+        (Stairs(0.1, 2, 0.3, 0.9, is_open=True), {0.85: 0.0, 0.95: 0.1, 1.25: 0.2}),
+        (Blocks(0.1, 0.5, 1.0, 2, 0.6), {0.55: 0.0, 0.65: 0.1, 1.15: 0.0, 2.15: 0.1, 2.65: 0.0}),
+        (Waves(0.1, 1.0, 2, 0.5), {0.45: 0.0, 1.0: 0.1, 0.75: 0.05, 1.5: 0.0, 2.0: 0.1, 2.55: 0.0}),
+        (Gap(0.2, 0.4, 0.7), {-1.0: 0.0, 0.65: 0.0, 0.75: -0.4, 0.85: -0.4, 0.95: 0.0}),
+        (
+            Course((Gap(0.2, 0.4, 0.7), Blocks(0.1, 1.0, count=1, start=0.5))),
+            {0.65: 0.0, 0.75: -0.4, 0.95: 0.0, 1.35: 0.0, 1.45: 0.1, 2.35: 0.1, 2.45: 0.0},
+        ),
         (Slope(STEEP), {1.0: math.tan(STEEP), -1.0: -math.tan(STEEP)}),
         (
             Ramp(STEEP, 1.0, 0.8),
@@ -212,6 +237,30 @@ def test_the_ground_is_as_high_as_the_terrain_says(
     for x, height in heights.items():
         assert ground_at(plant, x) == pytest.approx(height, abs=1e-9), x
         assert ground_at(plant, x, 2.0) == pytest.approx(height, abs=1e-9), x
+
+
+def test_stones_stand_apart_in_their_pit_and_are_as_uneven_as_the_seed_says() -> None:
+    stones = Stones(0.25, 0.1, 4, 0.4, uneven=0.03, seed=5)
+    plant = MujocoPlant(terrain=stones)
+    tops = [ground_at(plant, stones.start + 0.225 + 0.35 * n, 0.35) for n in range(stones.count)]
+    between = [ground_at(plant, stones.start + 0.05 + 0.35 * n, 0.35) for n in range(5)]
+    assert between == pytest.approx([-0.4] * 5)
+    assert all(-0.03 <= top <= 0.0 for top in tops)
+    assert len(set(tops)) == stones.count
+    assert stones.blocks() != Stones(0.25, 0.1, 4, 0.4, uneven=0.03, seed=6).blocks()
+    assert [ground_at(plant, x) for x in (-1.0, stones.end + 0.1)] == pytest.approx([0.0, 0.0])
+
+
+def test_a_random_course_is_as_long_as_asked_and_within_its_levels() -> None:
+    course = Course.drawn(3, height=0.1, length=12.0)
+    assert course == Course.drawn(3, height=0.1, length=12.0)
+    assert course != Course.drawn(4, height=0.1, length=12.0)
+    assert course.end >= 12.0
+    steps = [part.height for part in course.parts if isinstance(part, Stairs | Blocks | Waves)]
+    assert steps
+    assert all(0.05 <= height <= 0.1 for height in steps)
+    with pytest.raises(ConfigError, match="end"):
+        Course((Stairs(),))
 
 
 @pytest.mark.parametrize("own", [0.1, 1.3], ids=["slipperier", "rougher"])

@@ -1,0 +1,273 @@
+"""``python -m benchmarks rough``: stairs, blocks, slopes and waves, blind; and reversals.
+
+On a terrain the robot stands up, walks ahead at the row's speed, and has done it if it is at the
+other end in the time that ``LEAST_SHARE`` of that speed takes, has not fallen, comes to rest and
+stands there. Drawn by the seed: friction, masses, where it starts, and its heading, which it keeps
+by its own estimate. A trunk that touches and goes on has not fallen; its touches are told. Judged
+by MuJoCo's truth; the controller is told nothing. Tuned on seeds below 9000; those that are judged
+begin at ``FIRST_SEED``.
+
+- speed off: of the mean speed from start to end, short of the commanded one [%];
+- calf, trunk: share of ticks [%] in which a leg above its foot, or the trunk, touches the ground;
+- saturated: share of ticks [%] in which some motor gives all it has at its speed;
+- rough torque: root mean square of the change of a torque in 0.1 s [N m].
+
+Reversals are ``COMMANDS``, each for ``EACH`` seconds, ``ROUNDS`` times, on level ground: what is
+told is the mean over time of the length of velocity less command, in the heading frame; also with
+commands that act 0 to 18 ms late, drawn anew every 20 ms, with 5 % of them lost, and on a friction
+of 0.3.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from benchmarks.command import Benchmark
+from benchmarks.study import Study, TrialResult
+from controller.modes import Mode
+from controller.motion_measurement import FULL
+from controller.sweeps.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.mujoco.ground_truth import FALLEN_TILT, TOUCH, TruthRecording
+from go2_wbc.plant.terrain import BOTH, DOWN, Blocks, Boxes, Course, Ramp, Stairs, Terrain, Waves
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import wrap_angle
+from go2_wbc.robot.state import JointCommand
+
+FIRST_SEED = 9600
+FRICTION, MASS, PLACE, YAW = (0.6, 0.9), (0.9, 1.1), (-0.1, 0.1), (-0.087, 0.087)
+"""What is drawn: friction, factor on the masses, place ahead [m], heading [rad]."""
+LEAST_SHARE, BEYOND, PATIENCE = 0.8, 0.5, 0.5
+"""Share of the speed; how far [m] behind the terrain's end its way ends; time [s] to set off."""
+STEER, LOOK, RIPPLE = 1.0, 0.1, 0.1
+"""Turning rate per heading error [1/s], how often it is corrected [s], and the span of time [s]."""
+COMMANDS = ((2.0, 0, 0), (-2.0, 0, 0), (0, 1.0, 0), (0, -1.0, 0), (0, 0, 2.0), (0, 0, -2.0))
+EACH, ROUNDS = 3.0, 5
+LATEST, HELD = 9, 10
+"""Control periods by which a command is late at most, and for which it is as late: 18, 20 ms."""
+
+
+class UnreliablePlant(MujocoPlant):
+    """A plant whose commands are late by a time that changes, or are lost."""
+
+    def __init__(self, settings: dict[str, Any], *, latest: int = 0, lost: float = 0.0) -> None:
+        """Commands act up to ``latest`` control periods late; this share of them gets ``lost``."""
+        self._latest, self._lost = latest, lost
+        self._sent: list[tuple[int, JointCommand]] = []
+        self._lag, self._draws = 0, np.random.default_rng(settings["seed"])
+        super().__init__(**settings)
+
+    def write(self, command: JointCommand) -> None:
+        """Apply the newest command that has arrived."""
+        now, rng = self._ticks, self._draws
+        if now % HELD == 0:
+            self._lag = int(rng.integers(self._latest + 1))
+        if rng.random() >= self._lost or not self._sent:
+            self._sent.append((now + self._lag, command))
+        arrived = [n for n, (when, _) in enumerate(self._sent) if when <= now] or [0]
+        self._sent = self._sent[arrived[-1] :]
+        super().write(self._sent[0][1])
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """A terrain, and how it is walked.
+
+    Attributes:
+        name: of the scenario.
+        item: what it is, for the report.
+        terrain: by the seed.
+        speed: commanded, ahead [m/s]; negative walks backwards.
+        length: where the robot has to come [m]; None for behind the end of the terrain.
+        heading: at the start [rad].
+        bar: least share of the trials that are done.
+    """
+
+    name: str
+    item: str
+    terrain: Callable[[int], Terrain]
+    speed: float = 0.5
+    length: float | None = None
+    heading: float = 0.0
+    bar: float | None = 0.95
+
+    @property
+    def study(self) -> Study:
+        """Its rows and its trial."""
+        bar = ">=" if self.bar is None else f">= {self.bar:g}"
+        rows = [
+            ("done", "share done", bar),
+            ("speed", "speed off", "%"),
+            ("calf", "ticks with a calf's touch", "%"),
+            ("trunk", "ticks with the trunk's touch", "%"),
+            ("saturated", "saturated ticks", "%"),
+            ("ripple", "rough torque", "N m"),
+        ]
+        measure = partial(measure_way, way=self)
+        return Study(self.name, {self.item: rows}, measure, done="done", group="terrain")
+
+    def plant(self, seed: int, sensors: str) -> MujocoPlant:
+        """The simulated robot of a trial."""
+        rng, terrain = np.random.default_rng(seed), self.terrain(seed)
+        friction, mass, yaw = (float(rng.uniform(*bounds)) for bounds in (FRICTION, MASS, YAW))
+        drawn = {"friction": friction, "mass_scale": mass, "initial_yaw": self.heading + yaw}
+        more = {"seed": seed, "sensors": sensors, "initial_joint_noise": JOINT_NOISE}
+        plant = MujocoPlant(terrain=terrain, **drawn, **more)
+        q = plant.truth().q.copy()
+        q[0] += float(rng.uniform(*PLACE))
+        plant.place(q)
+        return plant
+
+
+def measure_way(trial: Trial, found: TrialResult, way: Way, first_seed: int = FIRST_SEED) -> None:
+    """Walk the way; see the module's docstring for what is measured."""
+    seed = first_seed + trial.seed
+    length = way.terrain(seed).end + BEYOND if way.length is None else way.length
+    with TrialRobot(way.plant(seed, trial.sensors)) as robot:
+        robot.require(robot.go2.stand())
+        robot.require(robot.go2.walk())
+        robot.truth.clear()
+        try:
+            time = _walked(robot, way.speed, length)
+        finally:
+            found.values |= _measured(robot.truth.recording())
+        found.values["speed"] = 100.0 * (1.0 - length / (time * abs(way.speed)))
+        robot.go2.stop()
+        robot.require(robot.go2.stand())
+
+
+def _walked(robot: TrialRobot, speed: float, length: float) -> float:
+    """The time [s] that it took to come ``length`` ahead in its own direction.
+
+    Raises:
+        TrialFailed: if it falls or takes too long.
+    """
+    plant, go2 = robot.plant, robot.go2
+    start, course = plant.truth(), plant.read().yaw
+    most, side = PATIENCE + length / (LEAST_SHARE * abs(speed)), math.copysign(1.0, speed)
+    ahead = side * np.array([math.cos(start.yaw), math.sin(start.yaw)])
+    way = 0.0
+    while (elapsed := plant.time - start.time) <= most:
+        go2.move(speed, STEER * wrap_angle(course - plant.read().yaw))
+        go2.wait(LOOK)
+        if go2.mode is not Mode.WALKING or plant.truth().tilt > FALLEN_TILT:
+            raise TrialFailed(go2.last_outcome.reason or "it has tipped over")
+        way = float(ahead @ (plant.truth().q[:2] - start.q[:2]))
+        if way >= length:
+            return elapsed
+    raise TrialFailed(f"came {way:.1f} of {length:.1f} m in {most:.0f} s")
+
+
+def _measured(recorded: TruthRecording) -> dict[str, float]:
+    """Touches, saturated ticks and how rough the torques were."""
+    step = max(round(RIPPLE / float(np.diff(recorded.time[:2])[0])), 1)
+    change = recorded.tau[step:] - recorded.tau[:-step]
+    touches = {"calf": recorded.limb_force, "trunk": recorded.trunk_force}
+    shares = {name: force > TOUCH for name, force in touches.items()}
+    shares["saturated"] = recorded.torque_shares(RobotModel()) >= FULL
+    values = {name: 100.0 * float(flags.mean()) for name, flags in shares.items()}
+    return values | {"ripple": float(np.sqrt(np.mean(change**2))) if len(change) else 0.0}
+
+
+@dataclass(frozen=True, slots=True)
+class Reversals:
+    """Level ground under hard commands.
+
+    Attributes:
+        name: of the scenario.
+        item: what it is, for the report.
+        friction: in the place of what is drawn; None for that.
+        latest, lost: see ``UnreliablePlant``.
+    """
+
+    name: str
+    item: str
+    friction: float | None = None
+    latest: int = 0
+    lost: float = 0.0
+
+    @property
+    def study(self) -> Study:
+        """Its rows and its trial."""
+        rows = (("done", "share done", ">= 1"), ("off", "velocity off", "<= 0.25 m/s"))
+        measure = partial(measure_reversals, case=self)
+        return Study(self.name, {self.item: rows}, measure, done="done", group="reversals")
+
+
+def measure_reversals(
+    trial: Trial, found: TrialResult, case: Reversals, first_seed: int = FIRST_SEED
+) -> None:
+    """Follow the commands; see the module's docstring."""
+    seed = first_seed + trial.seed
+    rng, off = np.random.default_rng(seed), []
+    friction, mass = float(rng.uniform(*FRICTION)), float(rng.uniform(*MASS))
+    drawn = {"friction": case.friction or friction, "mass_scale": mass}
+    settings = {**drawn, "sensors": trial.sensors, "seed": seed}
+    plant = UnreliablePlant(settings, latest=case.latest, lost=case.lost)
+    with TrialRobot(plant) as robot:
+        robot.require(robot.go2.stand())
+        robot.require(robot.go2.walk())
+        for ahead, left, turn in COMMANDS * ROUNDS:
+            robot.truth.clear()
+            robot.go2.move(ahead, turn, linear_y=left)
+            robot.wait(EACH)
+            velocity = robot.truth.recording().com_velocity[:, :2]
+            off.append(float(np.linalg.norm(velocity - (ahead, left), axis=1).mean()))
+            found.values["off"] = float(np.mean(off))
+
+
+def _at(terrain: Terrain) -> Callable[[int], Terrain]:
+    return partial(_same, terrain)
+
+
+def _same(terrain: Terrain, _: int) -> Terrain:
+    return terrain
+
+
+def _stairs(height: float) -> Callable[[int], Terrain]:
+    return _at(Stairs(height, 6, 0.31, way=BOTH, landing=1.6))
+
+
+def _boxes(seed: int) -> Terrain:
+    return Boxes(height=0.12, count=300, seed=seed)
+
+
+SLOPE, ASLANT = math.radians(22.0), math.radians(20.0)
+_SLOPE, _DOWN = _at(Ramp(SLOPE, length=2.0)), _at(Stairs(0.13, 6, 0.31, way=DOWN))
+WAYS = (
+    Way("stairs-10", "6 stairs up and down, 10 cm, 0.3 m/s", _stairs(0.10), 0.3),
+    Way("stairs-13", "13 cm", _stairs(0.13), 0.3),
+    Way("stairs-14", "14 cm", _stairs(0.14), 0.3, bar=None),
+    Way("stairs-down", "6 stairs down, 13 cm, 0.3 m/s", _DOWN, 0.3, 3.5),
+    Way("stairs-aslant", "13 cm, aslant by 20 deg", _stairs(0.13), 0.3, heading=ASLANT),
+    Way("blocks", "4 blocks of 14 cm, 0.5 m/s", _at(Blocks(0.14)), bar=0.9),
+    Way("slope", "ramp of 22 deg up and down, 0.5 m/s", _SLOPE),
+    Way("slope-back", "the same backwards", _SLOPE, -0.5, heading=math.pi),
+    Way("waves", "5 waves of 8 cm, 0.5 m/s", _at(Waves(0.08))),
+    Way("boxes", "boxes up to 12 cm, 0.5 m/s", _boxes, length=3.5),
+    Way("course", "random course of 12 m, 0.4 m/s", Course.drawn, 0.4, bar=None),
+)
+CASES = (
+    Reversals("flat", "reversals"),
+    Reversals("flat-late", "the same, 0 to 18 ms late", latest=LATEST),
+    Reversals("flat-lost", "the same, 5 % lost", lost=0.05),
+    Reversals("flat-slippery", "the same, friction 0.3", friction=0.3),
+)
+_STUDIES = [*(way.study for way in WAYS), *(case.study for case in CASES)]
+STUDIES = (*_STUDIES, *(study.sensed(study.group) for study in _STUDIES))
+"""In the order of the report."""
+
+BENCHMARK = Benchmark(
+    "rough",
+    "Stairs, blocks, slopes and waves, blind; reversals on level ground.",
+    STUDIES,
+    takes="an hour on two cores",
+    examples=("--rows terrain --quick", "--rows stairs-13 sensed-stairs-13"),
+)
+register, run = BENCHMARK.register, BENCHMARK.run

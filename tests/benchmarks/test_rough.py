@@ -1,0 +1,67 @@
+"""Stairs, blocks and reversals: what a trial counts."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from benchmarks import rough
+from benchmarks.rough import CASES, STUDIES, WAYS, UnreliablePlant, Way, measure_way
+from benchmarks.study import TrialResult
+from controller.sweeps.trials import Trial
+from go2_wbc.plant.terrain import Blocks, Stairs, Terrain
+from go2_wbc.robot.state import JointCommand
+
+
+def low(_: int) -> Terrain:
+    return Blocks(0.03, 0.5, count=1, start=0.6)
+
+
+def wall(_: int) -> Terrain:
+    return Stairs(0.5, 1, start=0.6)
+
+
+def measured(way: Way) -> TrialResult:
+    return replace(way.study, measure=partial(measure_way, way=way, first_seed=0)).run(0)
+
+
+def test_who_comes_behind_the_end_in_time_and_stands_has_done_it() -> None:
+    way = Way("low", "a low block", low)
+    done = measured(way)
+    assert set(done.values) == {metric.name for metric in way.study.metrics}
+    assert done.values["low.done"] == 1.0
+    assert done.values["low.speed"] < 100.0 * (1.0 - rough.LEAST_SHARE)
+
+
+def test_who_meets_a_wall_has_not() -> None:
+    failed = measured(Way("wall", "a wall", wall, length=1.0))
+    assert failed.values["wall.done"] == 0.0
+    assert failed.failures["wall.done"] == failed.reason
+
+
+def test_reversals_are_told_by_how_far_the_velocity_is_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in (("EACH", 0.5), ("ROUNDS", 1)):
+        monkeypatch.setattr(rough, name, value)
+    found = TrialResult()
+    rough.measure_reversals(Trial(0), found, CASES[0], first_seed=0)
+    assert 0.2 < found.values["off"] < 2.0
+
+
+def test_commands_are_late_by_what_is_drawn_or_get_lost() -> None:
+    plant = UnreliablePlant({"seed": 3}, latest=5, lost=0.2)
+    asked, acted = [], []
+    for n in range(400):
+        asked.append(float(n))
+        plant.write(JointCommand.damping(1.0 + 1e-6 * n))
+        acted.append(round((plant._sent[0][1].kd[0] - 1.0) * 1e6))
+    late = np.array(asked) - np.array(acted)
+    assert late[10:].min() >= 0
+    assert 4 <= late[10:].max() <= 10
+    assert np.all(np.diff(acted) >= 0)
+    assert 400 - len(set(acted)) > 40, "some never acted"
+
+
+def test_each_study_stands_once_and_once_on_sensors() -> None:
+    names = [study.name for study in STUDIES]
+    assert len(set(names)) == len(names) == 2 * (len(WAYS) + len(CASES))
