@@ -20,6 +20,7 @@ from types import NoneType, UnionType
 from typing import Any, TypeVar, cast
 
 import numpy as np
+from jaxtyping import jaxtyped
 
 from go2_wbc.errors import ConfigError, Go2WbcError
 from go2_wbc.validation import LARGEST, is_finite_number
@@ -160,7 +161,8 @@ def _is_array(value: object, kind: Any) -> bool:  # noqa: ANN401
     except ValueError:  # of lists of several lengths
         return False
     is_whole = array.dtype.kind in "iub" and "float64" in kind.dtypes
-    return isinstance(array.astype(float) if is_whole else array, kind)
+    with jaxtyped("context"):  # under pytest the caller's dimensions have names of its own
+        return isinstance(array.astype(float) if is_whole else array, kind)
 
 
 def _in_words(kind: object) -> str:
