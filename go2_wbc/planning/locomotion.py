@@ -29,6 +29,7 @@ from go2_wbc.planning.ground import (
     MOST_FRICTION,
     Slip,
     carry_ground,
+    greatest_speed,
     ground_at,
     ground_below,
     haste,
@@ -305,8 +306,8 @@ class LocomotionPlanner:
     def is_slowed(self) -> bool:
         """Whether rough ground keeps the robot slower than it is told."""
         x, y = self._state.trunk.velocity[:2].tolist()
-        is_fast = bool(np.hypot(x, y) > self._config.rough.speed - TIE)
-        return is_fast and self._state.ground.rough_way > 0.0
+        most = greatest_speed(self._state.ground, self._walk.config.rough)
+        return bool(np.hypot(x, y) > most - TIE)
 
     @property
     def is_stepping(self) -> bool:

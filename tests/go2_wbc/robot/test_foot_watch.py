@@ -12,7 +12,7 @@ DT = 0.002
 
 
 def watched(
-    held: float, force: float = 0.0, roll: float = 0.0, time: float = 0.1, gap: int = 1000
+    held: float, force: float = 0.0, roll: float = 0.0, time: float = 0.1, gap: float = np.inf
 ) -> FootWatch:
     """After its second foot has been held with a force [N] for a time, but for some ticks."""
     watch, q = FootWatch(), np.zeros(19)
