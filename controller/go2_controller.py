@@ -390,7 +390,6 @@ class GO2Controller:
         """Peaks and counts of the run so far."""
         return self._runner.loop.telemetry
 
-    @typed(error=CommandError)
     def recording(self, rate: float = 100.0) -> Recording:
         """The run so far (its last minutes), at about ``rate`` samples a second."""
         samples = self._runner.between_ticks(lambda: self.telemetry.samples(rate))

@@ -40,6 +40,9 @@ def thing(name: str) -> Any:  # noqa: ANN401
         "report": lambda: thing("checked").report,
         "recording": lambda: thing("checked").recording(),
         "verdict": lambda: _verdict(),
+        "relation": lambda: importlib.import_module("viz").Relation(
+            ("a",), "b", False, (("c",),), np.zeros((1, 4)), np.zeros(1), np.zeros((2, 2))
+        ),
         "steep": lambda: motions.Timeline().body(pitch=1.0, over=0.3).home(over=0.3),
         "command": lambda: go2_wbc.JointCommand.damping(2.0),
         "wbc": lambda: go2_wbc.WholeBodyController(thing("model")),
@@ -117,7 +120,11 @@ EXEMPT |= {
     *(
         "go2_wbc.JointCommand.torque",
         "go2_wbc.JointCommand.asked",
-        "go2_wbc.WholeBodyController.solve(relax)",
+        *(
+            "go2_wbc.WholeBodyController.solve(relax)",
+            "go2_wbc.Recording(robot)",
+            "viz.Relation(stats)",
+        ),
     ),
     *("motions.CompiledPlan.row_at", "motions.CompiledPlan.feedback_at"),
     *("go2_wbc.ContactSchedule.at", "go2_wbc.LocomotionPlanner.why_not_resting"),
@@ -141,6 +148,7 @@ WITH: dict[str, dict[str, object]] = {
 """What some need that could be left out."""
 LIKE: dict[str, Callable[[], object]] = {
     "Recording": _of("recording"),
+    "Relation": _of("relation"),
     "Verdict": _of("verdict"),
     "MarginCurve": lambda: thing("verdict").curves[0],
     "Annotation": lambda: thing("verdict").annotations[0],
@@ -192,6 +200,8 @@ GOOD |= {
     "go2_wbc.LocomotionPlanner(config)": lambda: (
         importlib.import_module("go2_wbc").Config().locomotion
     ),
+    "viz.export_relations(relations)": lambda: [thing("relation")],
+    "viz.export_relations(path)": lambda: place() / "a.svg",
     "viz.export_html(shown)": _of("recording"),
     "viz.export_animation(shown)": _of("recording"),
     "viz.export_animation(path)": lambda: place() / "a.gif",

@@ -105,6 +105,9 @@ def run(
         viewer(extra)  # what is missing is told before the work
     meant, numbers = the_motion(motion, set), read_config(config)
     world = replace(World.of(friction, payload), sensors=sensors)
+    plant = plant_in_world(
+        world, seed=seed, mjcf=scene.mjcf, keyframe=scene.keyframe, visuals=scene.viewer
+    )
     with ProgressLine(is_quiet=json) as line:
         line.update(0.0, f"checking {meant.name}")
         checker = checker_of(numbers, world, line)
@@ -112,9 +115,6 @@ def run(
     plan, report = checked.plan, checked.report
     if not force:
         report.raise_if_infeasible()
-    plant = plant_in_world(
-        world, seed=seed, mjcf=scene.mjcf, keyframe=scene.keyframe, visuals=scene.viewer
-    )
     with getting_ready(plan, plant, line, numbers, viewer=scene.viewer) as (go2, truth):
         result = measure_motion(go2, truth, plan, checker.model)
         recording = go2.recording()

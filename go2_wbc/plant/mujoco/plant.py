@@ -293,9 +293,7 @@ class MujocoPlant(Plant):
         """Breaks a part of the robot, for tests and experiments.
 
         Args:
-            kind: one of ``go2_wbc.plant.faults.FaultKind``: ``"motor"``, ``"encoder"``,
-                ``"encoder_stuck"``, ``"foot_force"``, ``"gyro"``, ``"accelerometer"``,
-                ``"foot_held"``, ``"not_a_number"``, ``"lost_packets"``.
+            kind: a value of ``go2_wbc.plant.faults.FaultKind``, such as ``"motor"``.
             part: a joint (``"FL_calf_joint"``), a foot (``"FL_foot"``) or an axis (``"x"``).
             at: plant time [s]; now, unless said.
             value: what the part gives, or errs by; see ``FaultKind``.
