@@ -168,6 +168,6 @@ BENCHMARK = Benchmark(
     f"MuJoCo; a seed is a search of {PLAYS} plays.",
     STUDIES,
     takes="half an hour on two cores",
-    examples=("--rows trots static --seeds 2",),
+    examples=("--seeds 25", "--rows trots static --seeds 2"),
 )
 register, run = BENCHMARK.register, BENCHMARK.run

@@ -5,8 +5,6 @@ to a file and found again: what is judged is the whole way from the file to the 
 finder and the lead of the choreography were tuned on songs with seeds below 100.
 """
 
-from __future__ import annotations
-
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -46,7 +44,7 @@ ROWS = (
     ("on_beat", "accents within 40 ms", ">= 0.95"),
     ("late", "accent off its beat, mean", "ms"),
     ("heard", "heard beat off, mean", "ms"),
-    ("bars", "bars that begin where heard", "share"),
+    ("bars", "bars begun where heard", "share"),
 )
 """What is counted in every trial."""
 
@@ -58,7 +56,7 @@ def measure(trial: Trial, found: TrialResult, kind: str) -> None:
     - accents within 40 ms: of a true beat; one that did not happen is none of them;
     - accent off its beat: of those that happened;
     - heard beat off the true: of the pulses on which the dance is composed;
-    - bars that begin where heard: of those of the dance, the share within 40 ms of a true one.
+    - bars begun where heard: of those of the dance, the share within 40 ms of a true one.
     """
     song = song_of(kind, trial.seed)
     checker = _checker()

@@ -18,6 +18,7 @@ from controller.modes import Aborted, Measurements, Mode, Outcome
 from controller.navigation import DriveStraight, TurnInPlace
 from controller.pacing import REASON, LogOnce
 from controller.telemetry import Telemetry
+from go2_wbc.arguments import typed
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ClosedError, CommandError, Go2WbcError, ModeError, TimelineError
@@ -57,6 +58,7 @@ class GO2Controller:
         True
     """
 
+    @typed("after_tick")
     def __init__(
         self,
         namespace: str = "robot1",
@@ -178,8 +180,6 @@ class GO2Controller:
     ) -> None:
         """Walk like this until the next command; takes no time by itself.
 
-        A velocity beyond the envelope of the gait is clipped to it; the first one is warned of.
-
         Args:
             linear_x: forward speed [m/s], negative is backward.
             angular_z: turning rate [rad/s], positive is left.
@@ -219,7 +219,6 @@ class GO2Controller:
         Raises:
             CommandError: for what is no finite number, or looks like degrees.
         """
-        angle = finite_number("angle", angle)
         return self._call("turn_left", lambda: self._pilot.run_goal(TurnInPlace(angle)))
 
     def turn_right(self, angle: float) -> bool:
@@ -239,18 +238,17 @@ class GO2Controller:
         Raises:
             CommandError: for what is no finite number.
         """
-        distance = finite_number("distance", distance)
         return self._call("move_forward", lambda: self._pilot.run_goal(DriveStraight(distance)))
 
     # --- motions --------------------------------------------------------------------------
 
+    @typed("plan", error=CommandError)
     def high_five(
         self, side: str = "right", hold: float = 2.0, *, plan: motions.CompiledPlan | None = None
     ) -> bool:
         """Raise a front paw on three legs, hold it, tap, and come back to standing.
 
         Args:
-            side: "right" or "left".
             hold: time [s] for which the paw is held up, 0.5 to 30.
             plan: what this motion was compiled to before; by default it is compiled now.
 
@@ -267,6 +265,7 @@ class GO2Controller:
                 plan = motions.compile_timeline(timeline, self._checker.model)
         return self._call("high_five", lambda: self._pilot.play(plan, stands_up=True))
 
+    @typed("times", "check", "allow_dynamic", error=CommandError)
     def play(
         self,
         motion: motions.Playable,
@@ -306,6 +305,7 @@ class GO2Controller:
 
         return self._call("play", play)
 
+    @typed("check", error=CommandError)
     def prepare(self, motion: motions.Playable, *, check: bool = True) -> MotionPlan:
         """What ``play`` plays: compiled, and checked, for this robot. Any thread may call it.
 
@@ -347,8 +347,7 @@ class GO2Controller:
             CommandError: for what is no finite number of 0 or more.
         """
         self._check_open()
-        if (seconds := finite_number("seconds", seconds)) < 0.0:
-            raise CommandError(f"seconds must not be negative, got {seconds}")
+        seconds = arguments.time("seconds", seconds)
         self._call("wait", lambda: self._pilot.wait(seconds), allow_fallen=True)
 
     @property
@@ -454,7 +453,7 @@ class GO2Controller:
                 self._pilot.collapse(reason)
                 reason = f"{reason}, damped"
             finally:
-                self._note(call, reason)
+                self._note(call, Outcome(False, reason))
             raise
         finally:  # no function is called in here: Python looks for Ctrl-C when one returns
             if "call" in self._turn and self._turn["call"] is call:
@@ -466,31 +465,24 @@ class GO2Controller:
             self._pilot.begin()
             measured = procedure()
         except Aborted as aborted:
-            self._note(call, str(aborted), aborted.measured)
+            self._note(call, Outcome(False, str(aborted), measured=aborted.measured))
             return False
         except Go2WbcError as error:
-            self._note(call, str(error), is_raised=True)
+            self._note(call, Outcome(False, str(error)), is_raised=True)
             raise
-        self._note(call, "done", measured, ok=True)
+        self._note(call, Outcome(True, "done", measured=dict(measured)))
         return True
 
-    def _note(
-        self,
-        call: _Call,
-        reason: str,
-        measured: Measurements | None = None,
-        *,
-        ok: bool = False,
-        is_raised: bool = False,
-    ) -> None:
+    def _note(self, call: _Call, outcome: Outcome, *, is_raised: bool = False) -> None:
         """What came of ``call``, and which parts are broken that the reason does not name."""
+        ok, reason = outcome.ok, outcome.reason
         if untold := [str(f) for f in self.health.faults if str(f) not in reason]:
             reason = "; ".join([reason, *untold])
         duration = self._runner.loop.state.time - call.start
-        self._last = Outcome(ok, reason, duration, dict(measured or {}))
+        self._last = replace(outcome, reason=reason, duration=duration)
         fault = self._runner.loop.fault
-        is_told = is_raised or (fault is not None and fault.reason in reason)  # logged by the loop
-        if ok or is_told:
+        is_known = is_raised or (fault is not None and fault.reason in reason)  # logged by the loop
+        if ok or is_known:
             _log.info("%s() after %.2f s: %s", call.name, duration, reason)
         else:
             _log.warning(REASON, reason)

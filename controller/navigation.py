@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 
 from controller.modes import Limited
 from go2_wbc.errors import CommandError
-from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.planning.command import VelocityCommand, finite_number
 from go2_wbc.robot.rotations import wrap_angle
 from go2_wbc.robot.state import RobotState
 
@@ -87,7 +87,7 @@ class TurnInPlace(Goal):
 
     def __init__(self, angle: float) -> None:
         """Turn by ``angle`` [rad], negative turns right; CommandError beyond ``GREATEST_TURN``."""
-        if abs(angle) > GREATEST_TURN:
+        if abs(finite_number("angle", angle)) > GREATEST_TURN:
             raise CommandError(
                 f"angle of {angle:g} rad looks like degrees: write deg({angle:g}), from motions "
                 f"import deg; a turn goes to 360 deg at most, and this is {math.degrees(angle):.0f}"
@@ -118,7 +118,7 @@ class DriveStraight(Goal):
 
     def __init__(self, distance: float) -> None:
         """Walk ``distance`` [m], negative goes back; CommandError beyond ``GREATEST_DISTANCE``."""
-        if abs(distance) > GREATEST_DISTANCE:
+        if abs(finite_number("distance", distance)) > GREATEST_DISTANCE:
             limit = f"+-{GREATEST_DISTANCE:.0f} m"
             raise CommandError(f"distance must be within {limit}, got {distance}")
         super().__init__(f"walk {distance:.3f} m", distance, WALK_SPEED)

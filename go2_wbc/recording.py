@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from go2_wbc.arguments import typed
 from go2_wbc.brief import cut, inline_html
 from go2_wbc.errors import ConfigError, MissingDependency
 from go2_wbc.extras import EXTRAS, install_line
@@ -43,6 +44,7 @@ class Span:
     label: str
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 class Recording:
     """Samples of one run, all of the same length n.
@@ -86,6 +88,7 @@ class Recording:
         """Seconds between the first and the last sample."""
         return float(self.time[-1] - self.time[0]) if len(self.time) else 0.0
 
+    @typed(late=True)
     def part(self, rows: slice | Int[np.ndarray, " k"]) -> Recording:
         """Some of the samples, with their times unchanged.
 
@@ -96,6 +99,7 @@ class Recording:
         arrays = {name: getattr(self, name)[rows] for name in _ARRAYS}
         return replace(self, **arrays, labels=tuple(labels))
 
+    @typed()
     def save(self, path: Path | str) -> Path:
         """Write it to a ``.npz`` file, which ``load`` and ``numpy.load`` read; gives its path.
 
@@ -108,6 +112,7 @@ class Recording:
         return write_atomically(target, stream.getvalue())
 
     @staticmethod
+    @typed()
     def load(path: Path | str) -> Recording:
         """What ``save`` has written, also before a recording said which robot it holds: a Go2.
 
@@ -145,6 +150,7 @@ class Recording:
                 columns |= {f"{name}{i}": column for i, column in enumerate(values.T)}
         return pandas.DataFrame(columns)
 
+    @typed()
     def export(self, path: Path | str) -> Path:
         """Write it for other viewers: ``.mcap`` for Foxglove, ``.rrd`` for Rerun; gives its path.
 

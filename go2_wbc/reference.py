@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.algebra.linear import cross, dot, triple
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.compilation import Foreign, kernel
 from go2_wbc.errors import CommandError
@@ -277,6 +278,7 @@ class Reference:
             _set(self, "_row", row)
         return row
 
+    @typed(late=True)
     def placed(self, anchor: Anchor) -> Reference:
         """This reference, given in the frame of a motion, in the world."""
         R, body = yaw_rotation(anchor.yaw), self.body

@@ -210,11 +210,6 @@ def test_the_reference_has_errors() -> None:
 # --- feasibility ------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def checker() -> FeasibilityChecker:
-    return FeasibilityChecker()
-
-
 def test_every_check_that_the_report_can_name_is_explained(checker: FeasibilityChecker) -> None:
     plan = compile_timeline(load_motion("bow"), checker.model)
     far = Timeline().foot("FR", x=0.7, z=0.1, over=1.0).home(over=1.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 
 from controller.behaviours import Behaviour
@@ -14,6 +16,8 @@ from go2_wbc.planning.trunk import LEVEL, SETTLED_COMMAND, BodyPose
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import Snapshot
+
+_log = logging.getLogger(__name__)
 
 
 class Walking(Behaviour):
@@ -40,7 +44,8 @@ class Walking(Behaviour):
         self.pose: BodyPose = LEVEL
         self.choice: GaitChoice | None = None
         self._limit, self._is_limited_until = VelocityEnvelope(), -np.inf
-        self._planner = LocomotionPlanner(model, gait, config)
+        self._planner, self._most = LocomotionPlanner(model, gait, config), config.rough.speed
+        self._has_told = False
 
     def start(self, snapshot: Snapshot) -> None:
         """Start from the measured state, standing."""
@@ -55,7 +60,11 @@ class Walking(Behaviour):
             gait, command = self.choice.update(now, velocity, command)
             if gait != self.gait:
                 self.change_gait(gait)
-        return self._planner.update(snapshot, command, self.pose)
+        reference = self._planner.update(snapshot, command, self.pose)
+        if self._planner.is_slowed and not self._has_told:
+            self._has_told = True
+            _log.warning("rough ground: %g m/s at most until it is smooth again", self._most)
+        return reference
 
     def square_up(self, snapshot: Snapshot) -> bool:
         """Step in place unless the feet are below the hips; returns whether they are."""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from controller.bridges.unitree import LOOPBACK
 from controller.cli.common import ExitCode, print_json_line
-from controller.cli.options import Mjcf, Numbers
+from controller.cli.options import Mjcf, Numbers, dds_domain
 from go2_wbc.errors import PlantError
 from go2_wbc.world import SENSORS
 
@@ -50,7 +50,7 @@ def ros2(
 
 def unitree_sim(
     *,
-    domain: Annotated[int, "N", "default %(default)s"] = 1,
+    domain: Annotated[int, "N", "default %(default)s", dds_domain] = 1,
     interface: Annotated[str, "NAME", "network, default %(default)s"] = LOOPBACK,
     mjcf: Mjcf = None,
     friction: Annotated[float | None, "MU", "of the feet, default 0.8"] = None,
@@ -96,7 +96,7 @@ def unitree_sim(
 def unitree_drive(
     *,
     interface: Annotated[str, "NAME", f"{LOOPBACK} for a simulator"],
-    domain: Annotated[int, "N", "0 robot, 1 simulator"] = 0,
+    domain: Annotated[int, "N", "0 robot, 1 simulator", dds_domain] = 0,
     i_have_the_remote_in_hand: Annotated[bool, "required: you can stop it"] = False,
     steps: Annotated[
         tuple[str, ...],

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 from controller.cli.common import PROGRAM, ExitCode, Subparsers, examples_epilog, installed_version
 from controller.cli.options import add_command
+from controller.cli.progress import TRIES
 from controller.pacing import REASON
 from go2_wbc.errors import (
     CommandError,
@@ -172,7 +173,9 @@ def _run(program: Program, argv: list[str]) -> int:
 
 
 def _is_news(record: logging.LogRecord) -> bool:
-    """Whether a log line says more than what commands print of the robot that they drive."""
+    """Whether a log line says more than what commands print: outcomes, and what is tried."""
+    if record.name.startswith(f"{TRIES}."):
+        return record.levelno > logging.INFO or logging.getLogger().isEnabledFor(logging.INFO)
     is_service = logging.getLogger(record.name).isEnabledFor(logging.INFO)  # or it is verbose
     return is_service or record.msg != REASON
 

@@ -27,7 +27,7 @@ from controller.cli.motion_args import (
     print_verdict,
     the_motion,
 )
-from controller.cli.options import Json, Numbers, output
+from controller.cli.options import Json, Numbers, folder, output
 from controller.cli.progress import ProgressLine
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.files import checked_output, write_atomically
@@ -108,7 +108,7 @@ def new(
     scene: Annotated[
         bool, "a scene instead: MJCF with a box on its back, a ramp, keyframes"
     ] = False,
-    out: Annotated[Path, "DIR", "default: here"] = Path(),
+    out: Annotated[Path, "DIR", "default: here", folder] = Path(),
     json: Json = False,
 ) -> int:
     """Write a small, commented motion, or a scene for MuJoCo, to start from.
@@ -198,7 +198,7 @@ def check(
             progress.update(number / len(lines), line.name)
             reports.append(checker.check(line))
             if fix and not reports[-1].ok:
-                progress.update((number + 0.5) / len(lines), f"{line.name}: changes")
+                progress.update((number + 0.5) / len(lines), f"{line.name}, changes")
                 changes[line.name] = suggest(line, checker=checker)
     if json:
         print_json([_report(report, changes) for report in reports])
@@ -225,7 +225,7 @@ def _print_reports(
 def _print_changes(name: str, found: Sequence[Suggestion]) -> None:
     """What to append to the motion ``name`` to make it feasible, the least change first."""
     if not found:
-        print(f"\n{name}: no change of tempo, size, height or shift time makes it feasible.")
+        print(f"\n{name}: no change of tempo, size, height, shifts or jumps makes it feasible.")
         return
     print(f"\n{name} is feasible with one of these appended, the least change first:")
     for one in found:

@@ -17,13 +17,14 @@ through a pace.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import GAITS, TIE, Gait, Stride
+from go2_wbc.planning.ground import RoughConfig
 from go2_wbc.records import Record
 
 PERIOD_RATE, DUTY_RATE, OFFSET_RATE = 0.2, 0.5, 0.8
@@ -63,19 +64,24 @@ class Cadence:
         wanted: its form, where it does not follow the speed.
         rest: the one in which the robot starts and comes to rest.
         stride: how period and duty follow the speed.
+        rough_stride: the same on rough ground.
         follows_speed: whether they do.
     """
 
     wanted: GaitForm
     rest: GaitForm
     stride: Stride
+    rough_stride: Stride
     follows_speed: bool
 
     @staticmethod
-    def of(gait: Gait) -> Cadence:
-        """That of a robot that walks with ``gait``."""
-        rest, stride = resting_gait(gait), gait.stride or Stride()
-        return Cadence(GaitForm.of(gait), GaitForm.of(rest), stride, gait.stride is not None)
+    def of(gait: Gait, rough: RoughConfig | None = None) -> Cadence:
+        """That of a robot that walks with ``gait``, on rough ground as told."""
+        rest, stride, c = resting_gait(gait), gait.stride or Stride(), rough or RoughConfig()
+        longest = max(min(stride.stance_max, c.stance), stride.stance_min)
+        on_rough = replace(stride, swing=stride.swing + c.swing, stance_max=longest)
+        forms = GaitForm.of(gait), GaitForm.of(rest)
+        return Cadence(*forms, stride, on_rough, gait.stride is not None)
 
 
 class Clock(Record):
@@ -85,6 +91,7 @@ class Clock(Record):
         time: since the stride's start or a whole number of strides before [s].
         period, duty, offsets, width: form of the gait as it is now.
         goal: offsets to which those of now were aligned.
+        is_rough: whether its strides are those on rough ground.
     """
 
     time: float
@@ -93,6 +100,7 @@ class Clock(Record):
     offsets: Float[np.ndarray, "4"]
     width: float
     goal: Float[np.ndarray, "4"]
+    is_rough: bool
 
 
 def resting_gait(gait: Gait) -> Gait:
@@ -191,7 +199,7 @@ def adapt(
     elif c.follows_speed:
         if is_thrown:
             fall, hurries = DUTY_FALL, True
-        period, duty = stride_at(c.stride, speed)
+        period, duty = stride_at(c.rough_stride if clock.is_rough else c.stride, speed)
     if differ(offsets, clock.goal):
         align(clock, offsets)
     left = abs(clock.period - period) / PERIOD_RATE

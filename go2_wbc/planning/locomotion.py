@@ -16,8 +16,10 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.contacts import TIE, Gait
+from go2_wbc.errors import CommandError
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.footholds import foothold, nominal_feet
 from go2_wbc.planning.force_mpc import apply_force_plan
@@ -25,12 +27,13 @@ from go2_wbc.planning.gait_clock import adapt, foot_phase, restart
 from go2_wbc.planning.ground import (
     LEAST_FRICTION,
     MOST_FRICTION,
-    ROUGH_SPEED,
     Slip,
     carry_ground,
+    greatest_speed,
     ground_at,
     ground_below,
     haste,
+    is_rough,
     learn_ground,
     level_friction,
     note_stumble,
@@ -113,6 +116,7 @@ def adapt_gait(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) 
     is_thrown = thrown > speed
     speed = max(thrown, speed) + arm * abs(s.trunk.velocity[2])
     is_resting = is_zero(command) and is_settled(s.trunk)
+    s.clock.is_rough = is_rough(s.ground)
     adapt(s.clock, c.cadence, dt, speed, is_resting, is_thrown)
 
 
@@ -128,7 +132,7 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
         follow_position(trunk, now, config.position_leash, dt)
     else:
         rest_in_place(now, s, config.position_leash, dt)
-    carry_ground(s.ground, now, dt)
+    carry_ground(s.ground, config.rough, now, dt)
     correct_height(trunk, now, s.ground.height + c.height, dt)
 
 
@@ -146,7 +150,7 @@ def note_liftoffs(
     for leg in range(4):
         foot = s.feet[leg].contact
         if foot.was_stance and not stance[leg]:
-            begin_swing(s.feet[leg].swing, now.p_world_feet[leg], s.ground)
+            begin_swing(s.feet[leg].swing, now.p_world_feet[leg], s.ground, c.config.rough)
         if not stance[leg]:
             foot.is_awaited = False
             is_middle = abs(progress[leg] - 0.5) <= MID_SWING + TIE
@@ -213,7 +217,7 @@ def plan(
     """
     dt = time - s.time
     s.time = time
-    slow_down(s.ground, command.velocity)
+    slow_down(s.ground, c.config.rough, command.velocity)
     advance_phase(now, s, c, command, dt)
     integrate(now, s, c, command, dt)
     if s.is_stepping:
@@ -243,12 +247,14 @@ def plan(
 class LocomotionPlanner:
     """Turns a velocity command into references, one tick after the other."""
 
+    @typed()
     def __init__(self, model: RobotModel, gait: Gait, config: LocomotionConfig) -> None:
         """Prepare a planner; ``start`` sets it on its way."""
         self._model, self._config = model, config
         self._state, self._command = Planner(), Command()
         self.change_gait(gait)
 
+    @typed()
     def start(
         self, snapshot: Snapshot, friction: float | None = None, has_slid: bool = True
     ) -> None:
@@ -260,6 +266,8 @@ class LocomotionPlanner:
             has_slid: whether a foot has shown that, and not only that it is at least as high.
         """
         known = self._config.ground_friction if friction is None else friction
+        if known <= 0.0:
+            raise CommandError(f"friction must be above 0, got {friction}")
         feet = [
             Foot(
                 contact=FootContact(since=np.inf, was_stance=True),
@@ -280,6 +288,7 @@ class LocomotionPlanner:
         )
         restart(self._state.clock, self._walk.cadence)
 
+    @typed()
     def change_gait(self, gait: Gait) -> None:
         """Walk on with ``gait``; while it walks the strides pass over into it one after the other.
 
@@ -297,7 +306,8 @@ class LocomotionPlanner:
     def is_slowed(self) -> bool:
         """Whether rough ground keeps the robot slower than it is told."""
         x, y = self._state.trunk.velocity[:2].tolist()
-        return bool(self._state.ground.rough_time > 0.0 and np.hypot(x, y) > ROUGH_SPEED - TIE)
+        most = greatest_speed(self._state.ground, self._walk.config.rough)
+        return bool(np.hypot(x, y) > most - TIE)
 
     @property
     def is_stepping(self) -> bool:
@@ -319,6 +329,7 @@ class LocomotionPlanner:
         """Whether a foot has, and has shown that friction."""
         return bool(self._state.slip.has_slid)
 
+    @typed(late=True)
     def square_up(self, snapshot: Snapshot) -> bool:
         """Start stepping unless every foot is below its hip; returns whether they all are."""
         is_done = bool(is_square(snapshot, self._state, self._walk))
@@ -330,6 +341,7 @@ class LocomotionPlanner:
         """Why a robot without a command has not come to rest, in plain words; "" if it has."""
         return why_not_resting(snapshot, self._state, self._walk)
 
+    @typed(late=True)
     def update(
         self, snapshot: Snapshot, command: VelocityCommand, pose: BodyPose = LEVEL
     ) -> Reference:

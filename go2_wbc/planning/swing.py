@@ -33,7 +33,7 @@ import numpy as np
 from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
 from go2_wbc.planning.gait_clock import Clock
-from go2_wbc.planning.ground import Ground, apex_raise, delay
+from go2_wbc.planning.ground import Ground, RoughConfig, apex_raise, delay
 from go2_wbc.records import Array3, Record
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
@@ -131,10 +131,10 @@ class Swing(Record):
 
 
 @subroutine
-def begin_swing(swing: Swing, p_foot: Array3, ground: Ground) -> None:
+def begin_swing(swing: Swing, p_foot: Array3, ground: Ground, c: RoughConfig) -> None:
     """A foot leaves the ground."""
     swing.start[:] = p_foot
-    swing.raised, swing.delay, swing.begun = apex_raise(ground), delay(ground), 0.0
+    swing.raised, swing.delay, swing.begun = apex_raise(ground, c), delay(ground), 0.0
 
 
 @subroutine

@@ -11,7 +11,7 @@ from go2_wbc.contacts import Gait
 from go2_wbc.errors import ConfigError
 from go2_wbc.planning import ground, swing
 from go2_wbc.planning.gait_clock import Cadence, Clock
-from go2_wbc.planning.ground import Ground, Slip
+from go2_wbc.planning.ground import Ground, RoughConfig, Slip
 from go2_wbc.planning.mpc import Horizon, MpcConfig
 from go2_wbc.planning.swing import FootContact, Swing, SwingConfig
 from go2_wbc.planning.trunk import PoseConfig, Trunk
@@ -85,6 +85,7 @@ class LocomotionConfig:
         swing: shape of the swing.
         mpc: planning of the forces ahead.
         pose: how a new pose of the trunk is approached.
+        rough: how it walks on rough ground.
     """
 
     height: float = 0.29
@@ -105,6 +106,7 @@ class LocomotionConfig:
     swing: SwingConfig = field(default_factory=SwingConfig)
     mpc: MpcConfig = field(default_factory=MpcConfig)
     pose: PoseConfig = field(default_factory=PoseConfig)
+    rough: RoughConfig = field(default_factory=RoughConfig)
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a height that the legs have not, or forces without a range."""
@@ -154,7 +156,7 @@ class Walk:
         """Those of a robot that walks with ``gait``."""
         return Walk(
             replace(config, swing=config.swing.at_most(gait.apex)),
-            Cadence.of(gait),
+            Cadence.of(gait, config.rough),
             config.height_on_feet,
             model.mass,
             model.gravity,

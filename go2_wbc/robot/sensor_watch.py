@@ -268,8 +268,11 @@ def watch_force(
         s.force_same[leg] += dt
     else:
         s.force_same[leg], s.load[leg] = 0.0, borne
-        noise = min(abs(rise - s.rise[leg]), MOST_NOISE)
-        s.noise[felt, leg] += (1.0 - np.exp(-dt / NOISE_TIME)) * (noise - s.noise[felt, leg])
+        has_landed = (s.force[leg] > UNFELT) != (felt == 1)
+        share = 0.0 if has_landed else 1.0 - np.exp(-dt / NOISE_TIME)
+        s.noise[felt, leg] += share * (
+            min(abs(rise - s.rise[leg]), MOST_NOISE) - s.noise[felt, leg]
+        )
     s.force[leg], s.rise[leg] = force, rise
     is_noisy = max(s.noise[0, leg], s.noise[1, leg]) > NOISY
     is_dead = force < UNFELT and borne - slack > (FREE if is_noisy else LOADED)

@@ -170,7 +170,7 @@ def optimum(
     full = ShootingProblem(knots, model, limits, weights)
     search = Search(
         soft, full, knots,
-        is_good=lambda found: not objections(found),
+        objections=objections,
         turns=lambda found: task.plan(found).angle_deviation <= math.pi,
         budget=budget, progress=progress, start=start,
     )  # fmt: skip

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief, inline_html
 from go2_wbc.errors import CommandError, MotionError
 from go2_wbc.feasibility_limits import FeasibilityLimits
@@ -93,6 +94,7 @@ Playable = str | Path | Motion | Timeline | MotionPlan | CheckedMotion
 (with its default parameters), a timeline, a plan, or a motion that was checked before."""
 
 
+@typed("model", "mend", "progress")
 def compile_motion(
     motion: object,
     model: RobotModel,
@@ -156,6 +158,7 @@ class FeasibilityChecker:
         world: in which motions are checked.
     """
 
+    @typed()
     def __init__(
         self,
         model: RobotModel | None = None,
@@ -178,6 +181,7 @@ class FeasibilityChecker:
         self._collision = SelfCollision(self.model)
         self._hulls = hulls_of(self.model.description)
 
+    @typed("check")
     def plan(self, motion: Playable, *, check: bool = True) -> MotionPlan:
         """The plan of ``motion``, compiled and checked no more often than needed.
 
@@ -217,6 +221,7 @@ class FeasibilityChecker:
         """Instants [s] at which ``plan`` breaks a limit."""
         return np.concatenate([[], *(one.broken_at for one in self.evaluate(plan).report.series)])
 
+    @typed()
     def departure(self, plan: MotionPlan) -> dict[str, float]:
         """How far ``plan`` is from what was written, at most, by name with unit.
 
@@ -306,6 +311,7 @@ class FeasibilityChecker:
         ]
 
 
+@typed("world")
 def check(
     motion: Playable,
     *,

@@ -6,9 +6,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Self
 
+from go2_wbc.arguments import typed
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError
 from go2_wbc.legs import Leg
+from go2_wbc.validation import LARGEST
 from motions import arguments
 from motions.arguments import is_number, positive, quantity
 from motions.language.clock import LEAST_BEAT, SAME, BeatClock
@@ -42,6 +44,7 @@ class Arrangement(TimelineData):
 
     # --- time -----------------------------------------------------------------------------
 
+    @typed("name", error=TimelineError)
     def hold(self, seconds: float, *, name: str = "", foot: Leg | str | None = None) -> Self:
         """Stay as it is for this long.
 
@@ -93,6 +96,7 @@ class Arrangement(TimelineData):
         interval = 60.0 / beats_per_minute
         return self._counted(BeatClock.steady(interval), shift_time)
 
+    @typed("times", error=TimelineError, late=True)
     def on_beats(self, times: Iterable[float], *, shift_time: float | None = None) -> Self:
         """Count in the beats at these ``times`` [s] of the motion from here on.
 
@@ -156,8 +160,8 @@ class Arrangement(TimelineData):
         Raises:
             TimelineError: for a number below 1, another end than start, or too long a motion.
         """
-        if not (is_number(times) and isinstance(times, int) and times >= 1):
-            raise TimelineError(f"repeat() needs a whole number of 1 or more, got {times!r}")
+        if isinstance(times, bool) or not isinstance(times, int) or not 1 <= times <= LARGEST:
+            raise TimelineError(f"repeat() needs a whole number of 1 or more, got {times!r:.80}")
         self._require_length(times * max(self.end, SHORTEST))
         return self.then(*[self] * (times - 1))
 
@@ -208,6 +212,29 @@ class Arrangement(TimelineData):
 
         keys = tuple(key.retimed(when) for key in self.keys)
         return self._retimed(keys, when, 1.0 + longer)
+
+    def scale_jumps(self, share: float) -> Self:
+        """The same motion, its dynamic blocks ``share`` as high, as far and as steep.
+
+        Flights last as long as that takes, and what follows comes sooner; turns stay.
+
+        Raises:
+            TimelineError: of a motion without a dynamic block, or that keeps a tempo.
+        """
+        share = positive("share", share)
+        keys = [key.smaller(share) if isinstance(key, PhaseKey) else key for key in self.keys]
+        saved = [
+            (old.end, old.end - new.end)
+            for old, new in zip(self.keys, keys, strict=True)
+            if isinstance(old, PhaseKey)
+        ]
+        if not saved or self.shift_beats:
+            raise TimelineError("scale_jumps() needs a dynamic block, and no tempo to be kept")
+
+        def when(t: float) -> float:
+            return t - sum(less for end, less in saved if end <= t + SAME)
+
+        return self._retimed(tuple(key.retimed(when) for key in keys), when, 1.0)
 
     def _retimed(
         self, keys: tuple[Key, ...], when: Callable[[float], float], factor: float

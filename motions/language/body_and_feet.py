@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Self
 
+from go2_wbc.arguments import typed
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
@@ -100,6 +101,7 @@ class BodyAndFeet(TimelineData):
         start, end = self._span(over)
         return self._longer([PostureKey(start, end, Ease.MINIMUM_JERK, which)], end)
 
+    @typed("name", error=TimelineError)
     def pose(self, name: str, *, over: float, ease: EaseWord = Ease.MINIMUM_JERK) -> Self:
         """Move the trunk to a named pose: see ``POSES``.
 
@@ -110,6 +112,7 @@ class BodyAndFeet(TimelineData):
             raise TimelineError(unknown_name("pose", name, POSES))
         return self.body(**POSES[name], over=over, ease=ease)
 
+    @typed("times", error=TimelineError)
     def body_path(
         self,
         points: Sequence[Mapping[str, float]],
@@ -153,6 +156,7 @@ class BodyAndFeet(TimelineData):
             keys.append(BodyPathKey(start, end, *way))
         return self._longer(keys, end)
 
+    @typed("x", "y", "z", error=TimelineError)
     def look_at(
         self,
         x: float,

@@ -12,6 +12,7 @@ from dataclasses import replace
 from itertools import count, pairwise
 from typing import Self
 
+from go2_wbc.arguments import typed
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import LEGS, Leg
@@ -127,6 +128,7 @@ class DynamicBlocks(TimelineData):
         _lengthen(timed, len(phases) - 1, _next_beat(self.clock, now) - now)
         return self._block(tuple(timed))
 
+    @typed("stance", "body", "feet", "label", error=TimelineError)
     def phase(
         self,
         duration: float,

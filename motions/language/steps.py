@@ -10,6 +10,7 @@ from typing import Any, Self
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import LEGS, Leg
@@ -236,6 +237,7 @@ class Steps(TimelineData):
         key = StepKey(start, end, Ease.MINIMUM_JERK, which, place, rise, since=start)
         return line._longer([key], end)
 
+    @typed("gait", error=TimelineError)
     def walk(
         self,
         x: float = 0.0,
@@ -281,6 +283,7 @@ class Steps(TimelineData):
         """
         return self.walk(y=y, over=over, gait=gait)
 
+    @typed("gait", error=TimelineError)
     def path(
         self,
         points: Sequence[Sequence[float]],
@@ -310,6 +313,7 @@ class Steps(TimelineData):
         start, gait = self.cursor, STEP_GAITS[name]
         rhythm = self._rhythm(what, way.rounds(gait), over, name)
         end = start + rhythm.over
+        self._require_length(end)
         keys: list[Key] = list(steps_of(way, gait, rhythm, start))
         if self.balance:
             sway = BalanceShift(start, end, Ease.MINIMUM_JERK, frozenset(), is_swaying=True)

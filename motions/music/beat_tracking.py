@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.errors import CommandError
 from motions.music.metre import bars
@@ -87,6 +88,7 @@ class Beats:
     __repr__ = brief
 
 
+@typed()
 def beats(path: Path | str, metre: int | None = None) -> Beats:
     """The beats and the bars of a song: a WAV, FLAC, OGG or MP3 file.
 

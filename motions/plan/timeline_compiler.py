@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.interpolate import PPoly
 
+from go2_wbc.arguments import typed
 from go2_wbc.contacts import ContactSchedule
 from go2_wbc.curves import Ease
 from go2_wbc.errors import PlanNotFound, TimelineError
@@ -46,6 +47,7 @@ Broken = Callable[[CompiledPlan], Float[np.ndarray, " k"]]
 """Instants [s] at which a plan breaks a limit."""
 
 
+@typed(error=TimelineError)
 def compile_timeline(
     timeline: Timeline,
     model: RobotModel,

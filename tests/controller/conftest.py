@@ -11,11 +11,6 @@ from tests.controller.plants import WatchedPlant
 
 
 @pytest.fixture(scope="session")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-@pytest.fixture(scope="session")
 def raised(model: RobotModel) -> CompiledPlan:
     """A paw that is raised and put down again."""
     line = Timeline(name="raise").foot("FR", z=0.06, over=0.5).hold(0.2).home(over=0.5)

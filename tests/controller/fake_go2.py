@@ -3,8 +3,6 @@
 What is called is the real ``GO2Controller``; only how a call is carried out is not, nor the pilot.
 """
 
-from __future__ import annotations
-
 import logging
 import math
 from collections.abc import Callable, Mapping

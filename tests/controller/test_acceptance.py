@@ -1,7 +1,5 @@
 """A motion is done if it was near its plan, ended there, and held feet up on the average."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import pytest

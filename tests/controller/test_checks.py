@@ -1,7 +1,5 @@
 """A posture is one at any height of the ground, still, and with every foot down where it must."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

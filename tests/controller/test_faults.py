@@ -1,7 +1,5 @@
 """Every fault ends in a clear error of our own or in a limp robot, and the next call works."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A robot's day, and the promises of every call: honest, repeatable, and over when it is over."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The controller drives other plants, in realtime too, and leaves every one of them limp."""
 
-from __future__ import annotations
-
 from inspect import isfunction
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Goals point at their goal, slow down before it, and judge the measured pose."""
 
-from __future__ import annotations
-
 from math import cos, degrees, pi, radians, sin
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Modes after calls that failed, and calls that may only say yes to what was measured."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

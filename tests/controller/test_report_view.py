@@ -16,11 +16,6 @@ _ROUNDING = 1e-9
 
 
 @pytest.fixture(scope="module")
-def checker() -> FeasibilityChecker:
-    return FeasibilityChecker()
-
-
-@pytest.fixture(scope="module")
 def nod(checker: FeasibilityChecker) -> CheckedMotion:
     return checker.evaluate(Timeline(name="nod").body(pitch=0.1, over=0.6).home(over=0.6))
 

@@ -1,7 +1,5 @@
 """``take_over``: a robot that stands already is balanced from how it stands, or an honest False."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 

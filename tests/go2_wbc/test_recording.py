@@ -1,7 +1,5 @@
 """A recording can be cut, and tells what was done when."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """References: placing a motion in the world is a rigid motion, and anchors undo it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

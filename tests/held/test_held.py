@@ -4,8 +4,6 @@
 if it warns and goes on working; the stored set stays as it is.
 """
 
-from __future__ import annotations
-
 import importlib
 import json
 import logging

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.recording import Recording, Span
@@ -30,6 +31,7 @@ _SETTLED = 0.7  # share of a span after which a slow behaviour has taken its sha
 _CANDIDATES = 60  # poses of a span that are looked at
 
 
+@typed()
 def export_filmstrip(
     recording: Recording, path: Path, *, times: Sequence[float | int] | None = None
 ) -> Path:

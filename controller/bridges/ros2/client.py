@@ -148,7 +148,7 @@ class GO2ControllerNode(ros.Node):
 
     def turn_left(self, angle: float) -> bool:
         """Turn left in place by ``angle`` [rad], closed on odometry; negative turns right."""
-        return self._run_goal(TurnInPlace(finite_number("angle", angle)))
+        return self._run_goal(TurnInPlace(angle))
 
     def turn_right(self, angle: float) -> bool:
         """Turn right in place by ``angle`` [rad], closed on odometry."""
@@ -156,7 +156,7 @@ class GO2ControllerNode(ros.Node):
 
     def move_forward(self, distance: float) -> bool:
         """Walk ``distance`` [m] straight ahead, closed on odometry; negative is backward."""
-        return self._run_goal(DriveStraight(finite_number("distance", distance)))
+        return self._run_goal(DriveStraight(distance))
 
     def _run_goal(self, goal: Goal) -> bool:
         if not self.walk():

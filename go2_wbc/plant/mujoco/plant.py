@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, unknown_name
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant
@@ -80,6 +81,7 @@ class MujocoPlant(Plant):
         DescriptionError: if the robot's files are missing or broken.
     """
 
+    @typed("noise", "errors", "estimator")
     def __init__(
         self,
         mjcf: Path | str | None = None,
@@ -226,6 +228,7 @@ class MujocoPlant(Plant):
             self._truth = RobotState(self.time, q, v, self._tau.copy(), forces, touching)
         return self._truth
 
+    @typed(late=True)
     def write(self, command: JointCommand) -> None:
         """Applies ``command`` for one control period, with the motor law at every physics step.
 
@@ -254,7 +257,9 @@ class MujocoPlant(Plant):
             mujoco.mj_step1(model, data)
         self._tau = total / self._substeps if shares is None else total * shares / self._substeps
         self._ticks += 1
-        self._check_physics()
+        if np.count_nonzero(self._warnings):
+            raised = [mujoco.mju_warningText(int(i), 0) for i in np.flatnonzero(self._warnings)]
+            raise PlantError(f"physics failed at t={self.time:.3f} s: {'; '.join(raised)}")
         self._sense()
 
     def imu(self) -> ImuSample:
@@ -265,6 +270,7 @@ class MujocoPlant(Plant):
             self._imu = sample if noise is None else noise.corrupt_imu(sample, self._rng)
         return self._imu
 
+    @typed(error=CommandError, late=True)
     def push(self, force: Float[np.ndarray, "3"], duration: float, at: str = "base") -> None:
         """Pushes the robot, starting now; pushes overlay.
 
@@ -280,15 +286,14 @@ class MujocoPlant(Plant):
         self._check_open()
         self._pushes.add(force, duration, at)
 
+    @typed(error=CommandError, late=True)
     def fault(
         self, kind: str, part: str = "", at: float | None = None, value: float | None = None
     ) -> None:
         """Breaks a part of the robot, for tests and experiments.
 
         Args:
-            kind: one of ``go2_wbc.plant.faults.FaultKind``: ``"motor"``, ``"encoder"``,
-                ``"encoder_stuck"``, ``"foot_force"``, ``"gyro"``, ``"accelerometer"``,
-                ``"foot_held"``, ``"not_a_number"``, ``"lost_packets"``.
+            kind: a value of ``go2_wbc.plant.faults.FaultKind``, such as ``"motor"``.
             part: a joint (``"FL_calf_joint"``), a foot (``"FL_foot"``) or an axis (``"x"``).
             at: plant time [s]; now, unless said.
             value: what the part gives, or errs by; see ``FaultKind``.
@@ -313,6 +318,7 @@ class MujocoPlant(Plant):
         watch = self._senses or self._faults.watch
         return () if watch is None else watch.faults
 
+    @typed(late=True)
     def place(self, q: Float[np.ndarray, "19"], v: Float[np.ndarray, "18"] | None = None) -> None:
         """Moves the robot to a state at once, for tests and experiments; time stands still.
 
@@ -392,6 +398,7 @@ class MujocoPlant(Plant):
             faults=self._faults.save(),
         )
 
+    @typed(late=True)
     def restore(self, saved: SavedPhysics) -> None:
         """Goes back to a state that ``save`` of this plant, or of one built alike, returned."""
         self._check_open()
@@ -465,13 +472,6 @@ class MujocoPlant(Plant):
         rows = (contact.geom, contact.efc_address, contact.dim, data.efc_force)
         bin_forces(*rows, codes, self._is_elliptic, forces)
         return forces
-
-    def _check_physics(self) -> None:
-        """Raises ``PlantError`` if MuJoCo warned about anything."""
-        counts = self._warnings
-        if np.count_nonzero(counts):
-            raised = [mujoco.mju_warningText(int(i), 0) for i in np.flatnonzero(counts)]
-            raise PlantError(f"physics failed at t={self.time:.3f} s: {'; '.join(raised)}")
 
 
 def _numbers_of(command: JointCommand) -> Float[np.ndarray, "5 12"]:

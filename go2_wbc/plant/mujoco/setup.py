@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import ConfigError, DescriptionError, ModelMismatch
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.mujoco.layout import MujocoLayout, find_layout, foot_geoms
@@ -30,6 +31,7 @@ from go2_wbc.world import RANGES
 DEFAULT_FRICTION = 0.8
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(
     NOT_NEGATIVE,

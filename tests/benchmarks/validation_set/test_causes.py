@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
+from benchmarks.validation_set.drawing import to_and_fro
 from go2_wbc.legs import LEGS
 from motions import FeasibilityChecker, Timeline, deg
 
@@ -29,11 +30,6 @@ def lifts_in_turn(z: float) -> Timeline:
     return line.home(over=0.8)
 
 
-def to_and_fro(channel: str, size: float, over: float) -> Go:
-    there, back = ({channel: sign * size} for sign in (1.0, -1.0))
-    return lambda line: line.body(**there, over=over).body(**back, over=over)
-
-
 def tap(leg: str, z: float, up: float, down: float) -> Go:
     return lambda line: line.foot(leg, z=z, over=up).down(leg, over=down)
 
@@ -48,11 +44,12 @@ CAUSES: dict[str, tuple[Write, tuple[float, ...], str, tuple[float, ...]]] = {
         (), "clearance", (0.06, 0.10),
     ),
     "twists": (
-        lambda s: over_and_over(3, to_and_fro("yaw", deg(20.0), s), s),
+        lambda s: over_and_over(3, lambda line: to_and_fro(line, "yaw", deg(20.0), s), s),
         (), "slip", (0.20, 0.25, 0.30),
     ),
     "sways": (
-        lambda s: over_and_over(3, to_and_fro("y", 0.03, s), 0.5), (0.30, 0.40), "", (),
+        lambda s: over_and_over(3, lambda line: to_and_fro(line, "y", 0.03, s), 0.5),
+        (0.30, 0.40), "", (),
     ),
     "skims": (
         lambda s: Timeline().foot("FR", y=-0.05, z=s, over=0.6).down("FR", over=0.6).home(over=0.8),
@@ -63,7 +60,8 @@ CAUSES: dict[str, tuple[Write, tuple[float, ...], str, tuple[float, ...]]] = {
         (0.02, 0.04), "", (),
     ),
     "rocks": (
-        lambda s: over_and_over(4, to_and_fro("roll", 0.37, s), 0.5), (0.20,), "slip", (0.13,),
+        lambda s: over_and_over(4, lambda line: to_and_fro(line, "roll", 0.37, s), 0.5),
+        (0.20,), "slip", (0.13,),
     ),
     "stamps": (
         lambda s: over_and_over(3, tap("FR", 0.07, 0.4, s), 0.8), (0.15, 0.20, 0.25), "", (),
@@ -75,11 +73,6 @@ CAUSES: dict[str, tuple[Write, tuple[float, ...], str, tuple[float, ...]]] = {
 }  # fmt: skip
 """Motions by a size (degrees, metres or seconds); sizes that are done; the check that refuses the
 others, and these, which physics does not do."""
-
-
-@pytest.fixture(scope="module")
-def checker() -> FeasibilityChecker:
-    return FeasibilityChecker()
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """``go2-wbc dance``: composed, checked, played, measured; every way to fail has its message."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

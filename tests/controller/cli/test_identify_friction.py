@@ -1,7 +1,5 @@
 """``go2-wbc identify-friction``: a table, and a file that the controller takes."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

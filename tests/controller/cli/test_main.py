@@ -1,7 +1,5 @@
 """The command line finds its commands, and every way to fail has its message and exit code."""
 
-from __future__ import annotations
-
 import logging
 import os
 import shlex
@@ -28,6 +26,7 @@ USAGE = ExitCode.USAGE
 TRIAL = f"{swept.__name__}:trial"
 
 NEEDED = {
+    "completion": "bash",
     "certify": "bow",
     "dance": "song.wav",
     "export": "bow --out bow.csv",

@@ -1,7 +1,5 @@
 """The commands about motions: list, check, new, export and run."""
 
-from __future__ import annotations
-
 import csv
 import json
 import sys

@@ -1,7 +1,5 @@
 """``new --scene`` writes a scene that runs as it is; an edit that goes wrong is told in words."""
 
-from __future__ import annotations
-
 import json
 import sys
 import xml.etree.ElementTree as ET

@@ -1,7 +1,5 @@
 """``go2-wbc sweep``: what is printed and written, which exit code."""
 
-from __future__ import annotations
-
 import csv
 import json
 from functools import partial

@@ -1,7 +1,5 @@
 """Outcomes over what was swept: counted again by hand, in bins and in grids."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

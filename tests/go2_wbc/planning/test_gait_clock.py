@@ -22,6 +22,7 @@ from go2_wbc.planning.gait_clock import (
     stride_at,
     time_between,
 )
+from go2_wbc.planning.ground import RoughConfig
 
 TICK = 0.002
 SECONDS = 2.0
@@ -233,3 +234,10 @@ def test_a_stride_gets_shorter_with_the_speed_until_the_foot_cannot() -> None:
     assert stride_at(Stride(), 0.0) == pytest.approx((0.39, 20 / 39))
     assert stride_at(Stride(), 2.0) == pytest.approx((0.31, 10 / 31))
     assert stride_at(Stride(), 4.0) == pytest.approx((0.31, 8 / 31))
+
+
+@pytest.mark.parametrize("name", ["trot", "bound"])
+def test_on_rough_ground_feet_swing_for_longer_and_do_not_stand_for_longer(name: str) -> None:
+    rough, c = RoughConfig(), Cadence.of(GAITS[name])
+    assert c.rough_stride.swing == pytest.approx(c.stride.swing + rough.swing)
+    assert c.rough_stride.stance_max == min(c.stride.stance_max, rough.stance)

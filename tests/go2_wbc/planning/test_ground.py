@@ -17,13 +17,12 @@ from go2_wbc.planning.ground import (
     MOST_SLOPE,
     ROUGH,
     ROUGH_HASTE,
-    ROUGH_SPEED,
-    ROUGH_TIME,
     SLIP_SPEED,
     SMOOTH,
     STUMBLE,
     TOUCHDOWN_MASK,
     Ground,
+    RoughConfig,
     Slip,
     apex_raise,
     carry_ground,
@@ -32,6 +31,7 @@ from go2_wbc.planning.ground import (
     ground_at,
     ground_below,
     haste,
+    is_rough,
     learn_ground,
     level_friction,
     note_stumble,
@@ -42,6 +42,7 @@ from go2_wbc.robot.state import Snapshot
 from tests import engine_helpers as helpers
 
 MODEL = helpers.symmetric_model()
+CONFIG = RoughConfig()
 SLOPE = np.array([0.2, -0.1])
 EXACT = 1e-12
 TICK = 0.002
@@ -88,26 +89,33 @@ def test_it_is_carried_along_with_the_robot() -> None:
     snapshot = on_plane(SLOPE)
     ground = plane(snapshot)
     moved = snapshot.replaced(p_world_com=snapshot.p_world_com + [0.5, 0.2, 0.0])
-    carry_ground(ground, moved, TICK)
+    carry_ground(ground, CONFIG, moved, TICK)
     assert ground.height == pytest.approx(0.4 + SLOPE @ [0.5, 0.2], abs=EXACT)
 
 
-def test_the_robot_goes_slowly_on_rough_ground_and_for_a_while_after_it() -> None:
+def test_the_robot_goes_slowly_on_rough_ground_and_for_a_way_after_it() -> None:
     snapshot, asked = on_plane(SLOPE), np.array([1.2, -0.9, 2.0])
     ground = plane(snapshot)
+    walking = snapshot.replaced(v_world_com=np.array([0.5, 0.0, 0.0]))
+    half = 0.5 * CONFIG.way / 0.5  # s, in which half of the way is come
 
     def told() -> np.ndarray:
         velocity = asked.copy()
-        carry_ground(ground, snapshot, 0.5 * ROUGH_TIME)
-        slow_down(ground, velocity)
+        carry_ground(ground, CONFIG, walking, half)
+        slow_down(ground, CONFIG, velocity)
         return velocity
 
     np.testing.assert_array_equal(told(), asked)
     ground.roughness = 1.01 * ROUGH
-    slowly = asked * ROUGH_SPEED / 1.5
+    np.testing.assert_allclose(told(), asked * CONFIG.high_speed / 1.5)  # the first step
+    np.testing.assert_allclose(told(), asked * CONFIG.speed / 1.5)
+    ground.roughness = 1.01 * CONFIG.high
+    slowly = asked * CONFIG.high_speed / 1.5
     np.testing.assert_allclose(told(), slowly)
     ground.roughness = 0.99 * ROUGH
     np.testing.assert_allclose(told(), slowly)
+    carry_ground(ground, CONFIG, snapshot, 100.0)  # one that stands does not forget
+    assert is_rough(ground)
     np.testing.assert_array_equal(told(), asked)
 
 
@@ -116,7 +124,7 @@ def test_the_robot_speeds_up_as_the_ground_bears_it() -> None:
     assert haste(level, MOST_FRICTION) == 1.0
     assert haste(level, 0.5 * MOST_FRICTION) == pytest.approx(0.5)
     assert haste(slope, MOST_FRICTION) < 1.0
-    level.rough_time = 0.1
+    level.rough_way = 0.1
     assert haste(level, MOST_FRICTION) == pytest.approx(ROUGH_HASTE)
 
 
@@ -150,15 +158,18 @@ def test_a_step_raises_the_swing_for_a_while_and_smooth_ground_does_not() -> Non
     snapshot = on_plane(np.zeros(2))
     ground, front_left = plane(snapshot), np.array([True, False, False, False])
     learn(ground, snapshot.p_world_feet, front_left)
-    assert apex_raise(ground) == 0.0
+    assert apex_raise(ground, CONFIG) == 0.0
     learn(ground, snapshot.p_world_feet + [0.0, 0.0, 0.05], front_left)
-    assert apex_raise(ground) == pytest.approx(0.05 - SMOOTH)
+    assert apex_raise(ground, CONFIG) == pytest.approx(0.05 - SMOOTH)
     note_stumble(ground)
-    assert apex_raise(ground) == pytest.approx(STUMBLE - SMOOTH)
-    assert delay(ground) == pytest.approx(DELAY * apex_raise(ground) / MOST_RAISE)
+    assert apex_raise(ground, CONFIG) == pytest.approx(STUMBLE - SMOOTH)
+    assert delay(ground) == pytest.approx(DELAY * apex_raise(ground, CONFIG) / MOST_RAISE)
     for _ in range(20):
         learn(ground, snapshot.p_world_feet, np.ones(4, dtype=bool))
-    assert apex_raise(ground) == 0.0
+    assert apex_raise(ground, CONFIG) == 0.0
+    ground.rough_way = 0.1
+    assert apex_raise(ground, CONFIG) == CONFIG.raised
+    assert delay(ground) == 0.0
 
 
 def sliding(

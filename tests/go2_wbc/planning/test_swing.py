@@ -139,7 +139,7 @@ def test_a_gait_may_swing_lower_than_the_others_but_not_higher(
     assert rise == pytest.approx(expected, abs=2e-3)
 
 
-SLOWER = 2e-3  # m, by which the goal is nearer as the robot is to speed up more slowly
+SLOWER = 1e-3  # m in a tick: the robot is to speed up more slowly from then on
 STUMBLE = 44  # tick at 0.49 of the first swing, whose middle is far from both of its ends
 
 
@@ -161,8 +161,8 @@ def test_a_foot_that_stumbles_begins_anew_where_it_is_and_leaves_the_other_swing
     # of its partner jumped back by 5 cm on the way, and 35 of 60 robots fell over a step of 12 cm.
     calm, stumbling = references(stumbles=False), references(stumbles=True)
     start = helpers.symmetric_model().snapshot(helpers.state_of(helpers.standing_q()))
-    for before, after in zip(calm, stumbling, strict=True):
-        np.testing.assert_allclose(after.p_world_feet[3], before.p_world_feet[3], atol=SLOWER)
+    ways = [[one.p_world_feet[3] for one in run] for run in (calm, stumbling)]
+    np.testing.assert_allclose(np.diff(ways[1], axis=0), np.diff(ways[0], axis=0), atol=SLOWER)
     anew = stumbling[STUMBLE]
     assert not np.allclose(calm[STUMBLE].p_world_feet[0], start.p_world_feet[0], atol=0.02)
     np.testing.assert_allclose(anew.p_world_feet[0], start.p_world_feet[0], atol=EXACT)
@@ -171,7 +171,7 @@ def test_a_foot_that_stumbles_begins_anew_where_it_is_and_leaves_the_other_swing
     np.testing.assert_allclose(stumbling[a_while].p_world_feet[0, 0], start.p_world_feet[0, 0])
     assert stumbling[a_while].p_world_feet[0, 2] > start.p_world_feet[0, 2] + 0.01
     ends = [run[-1].p_world_feet[0] for run in (calm, stumbling)]
-    np.testing.assert_allclose(*ends, atol=5e-3)  # but for the last tick's way
+    np.testing.assert_allclose(*ends, atol=2e-2)  # but for the last tick, and a nearer goal
 
 
 @dataclass

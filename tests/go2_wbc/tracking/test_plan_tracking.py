@@ -1,7 +1,5 @@
 """A plan is followed where the robot stands, and what stays of the error is taken out."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -16,11 +16,6 @@ PROBLEMS = {
 
 
 @pytest.fixture(scope="session")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-@pytest.fixture(scope="session")
 def plans(model: RobotModel) -> dict[str, DynamicTrajectory]:
     if not (HAS_SOLVER or IS_REQUIRED):
         pytest.skip("crocoddyl is not installed: pip install go2-wbc[dynamics]")

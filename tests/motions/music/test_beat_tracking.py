@@ -3,8 +3,6 @@
 Tempi and seeds are others than those on which the beat finder was tuned.
 """
 
-from __future__ import annotations
-
 import sys
 import wave
 from pathlib import Path

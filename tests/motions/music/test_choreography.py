@@ -1,7 +1,5 @@
 """Dances: on the beats of any song, different by seed, feasible, and never the same move twice."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """A motion that was saved is the same motion when it is loaded, or the reason why not is said."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace

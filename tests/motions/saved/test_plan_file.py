@@ -1,7 +1,5 @@
 """A plan that was saved plays number by number as before, or the reason why not is said."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections.abc import Callable

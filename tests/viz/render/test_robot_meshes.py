@@ -1,7 +1,5 @@
 """The robot's looks against Pinocchio's own loader and against its mirror image."""
 
-from __future__ import annotations
-
 import logging
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What Foxglove and Rerun read of a recording is what was measured; a plot shows it too."""
 
-from __future__ import annotations
-
 import importlib
 import io
 import json

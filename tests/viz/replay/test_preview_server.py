@@ -1,7 +1,5 @@
 """The live page's server: only for this machine, only three answers."""
 
-from __future__ import annotations
-
 import http.client
 import json
 import re
