@@ -264,6 +264,9 @@ class LocomotionPlanner:
             snapshot: of this tick.
             friction: of the ground, as it is known; None if nothing is.
             has_slid: whether a foot has shown that, and not only that it is at least as high.
+
+        Raises:
+            CommandError: for a friction of 0 or less.
         """
         known = self._config.ground_friction if friction is None else friction
         if known <= 0.0:
