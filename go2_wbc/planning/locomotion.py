@@ -266,7 +266,7 @@ class LocomotionPlanner:
             has_slid: whether a foot has shown that, and not only that it is at least as high.
 
         Raises:
-            CommandError: for a friction that is not above 0.
+            CommandError: for a friction of 0 or less.
         """
         known = self._config.ground_friction if friction is None else friction
         if known <= 0.0:
