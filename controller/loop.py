@@ -106,7 +106,8 @@ class ControlLoop:
         self.latency = Latency(plant.control_period)
         self._ahead = self.state
         self._payloads = payloads
-        self._motors, self._feet, self._held = MotorWatch(model.motor), FootWatch(), np.zeros(4)
+        self._motors, self._held = MotorWatch(model.motor), np.zeros(4)
+        self._feet = FootWatch(model.mass * model.gravity)
         self.health = Health()
         self._commands = deque([JointCommand.damping(DAMPING)], LAGS)
         self._unanswered = 0

@@ -24,7 +24,7 @@ from controller.cli.motion_preview import VIDEO_RATE
 from controller.cli.options import Html, Json, Mjcf, Numbers, output, video_file, whole
 from controller.cli.progress import ProgressLine
 from controller.modes import Mode
-from go2_wbc.errors import PlantError, StanceMismatch
+from go2_wbc.errors import ConfigError, PlantError, StanceMismatch
 
 if TYPE_CHECKING:
     from controller.go2_controller import GO2Controller
@@ -99,6 +99,8 @@ def run(
     from go2_wbc.recording import EXPORTS, viewer
     from go2_wbc.world import World
 
+    if scene.keyframe is not None and scene.mjcf is None:
+        raise ConfigError("--keyframe names one of a scene: give its file, too, by --mjcf")
     if files.export is not None and (extra := EXPORTS.get(files.export.suffix)):
         viewer(extra)  # what is missing is told before the work
     meant, numbers = the_motion(motion, set), read_config(config)

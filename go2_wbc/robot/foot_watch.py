@@ -18,8 +18,9 @@ PULLED, LASTS, IMPULSE = 10.0, 0.024, 0.4
 face of a step, among boxes and under pushes of 90 N s strike for 14 ms at most."""
 UNFELT = 10.0
 """Force [N] below which a foot touches nothing: what stumbles is not held."""
-UPRIGHT = 0.3
-"""Tilt [rad] from which on a robot has more to do than to follow."""
+UPRIGHT, CARRIED = 0.3, 0.5
+"""Tilt [rad] from which on, and share of its weight on its feet below which, a robot tumbles: its
+legs strike each other. With a foot held, the others bear 0.65 at least."""
 
 
 class FootWatch:
@@ -29,8 +30,9 @@ class FootWatch:
         faults: feet that were held, in the order in which it was noticed.
     """
 
-    def __init__(self) -> None:
-        """Nothing is held."""
+    def __init__(self, weight: float) -> None:
+        """Nothing is held of a robot of this weight [N]."""
+        self._carried = CARRIED * weight
         self.faults: tuple[PartFault, ...] = ()
         self._time, self._impulse, self._last = np.zeros(4), np.zeros(4), -np.inf
 
@@ -39,7 +41,9 @@ class FootWatch:
 
         Ticks in which none is held may be left out.
         """
-        is_held = (held > PULLED) & (state.foot_forces < UNFELT) & (state.tilt < UPRIGHT)
+        forces = state.foot_forces
+        stands = state.tilt < UPRIGHT and forces.sum() > self._carried
+        is_held = (held > PULLED) & (forces < UNFELT) & stands
         goes_on = is_held & (state.time - self._last < 1.5 * dt)
         self._last = state.time
         self._time = np.where(is_held, self._time * goes_on + dt, 0.0)

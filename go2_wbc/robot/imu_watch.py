@@ -56,9 +56,9 @@ FINER = 1.0 / 3.0
 FORCE_LIMIT, FORCE_LASTS, STAYING = 0.45, 0.25, 0.62
 """Error of the accelerometer [m/s^2] that is named, if it lasts so long [s] without falling below
 this share of what it was: what a blow leaves fades."""
-UPWARDS, UPWARDS_LASTS = 0.85, 0.14
+UPWARDS, UPWARDS_LASTS = 0.85, 0.1
 """Share of it by which it points up or down, and how long [s] it lasts then: feet slide sideways,
-and a trot that believes it rises falls soon."""
+and a trot that believes it rises falls soon. Of sound ones 0.05 at most."""
 PUSHED = 0.6
 """Share of it by which the legs push the robot sideways, as they do if all feet slide together:
 what the accelerometer feels then is true."""

@@ -26,7 +26,7 @@ NOISY_SPEED, SPEED_SHARE = 1.0, 0.1
 """Error of a joint's speed [rad/s], and share of it by which it errs besides: it is read with
 noise, and changes within a tick if the robot is flung. Times the damping gain it is torque that
 seems to be asked for: of half of it sound motors were named in `recover`."""
-WEAK, DEAD = 0.65, 0.42
+WEAK, DEAD = 0.65, 0.46
 """Share below which it is broken, and below which it is dead: of one that has just died so much is
 left in the sums when it is named, and half a torque is half a torque."""
 LASTS = 0.12

@@ -12,13 +12,18 @@ DT = 0.002
 
 
 def watched(
-    held: float, force: float = 0.0, roll: float = 0.0, time: float = 0.1, gap: int = 1000
+    held: float,
+    force: float = 0.0,
+    roll: float = 0.0,
+    time: float = 0.1,
+    gap: float = np.inf,
+    others: float = 50.0,
 ) -> FootWatch:
     """After its second foot has been held with a force [N] for a time, but for some ticks."""
-    watch, q = FootWatch(), np.zeros(19)
+    watch, q = FootWatch(150.0), np.zeros(19)
     q[3], q[6] = np.sin(0.5 * roll), np.cos(0.5 * roll)
     for k in (k for k in range(round(time / DT)) if k % gap != gap - 1):
-        forces = np.array([50.0, force, 50.0, 50.0])
+        forces = np.array([others, force, others, others])
         state = RobotState(DT * k, q, np.zeros(18), np.full(12, 5.0), forces, forces > UNFELT)
         watch.update(np.array([0.0, held, 0.0, 0.0]), state, DT)
     return watch
@@ -39,6 +44,7 @@ def test_a_held_foot_is_named_once() -> None:
         {"roll": 0.5},
         {"time": 0.9 * LASTS},
         {"gap": 8},
+        {"others": 15.0},
     ],
 )
 def test_a_foot_that_follows_stumbles_is_struck_or_tumbles_is_not_held(
