@@ -175,7 +175,8 @@ def _in_words(kind: object) -> str:
     """What an annotation takes."""
     origin, parts = _parts(kind)
     if origin in _UNIONS:
-        return " or ".join(_in_words(part) for part in parts)
+        named = [part for part in parts if part is not int or float not in parts]
+        return " or ".join(map(_in_words, named))
     if hasattr(origin, "array_type"):
         return f"an array of shape ({origin.dim_str.strip()})"
     if origin in _WORDS:

@@ -426,7 +426,7 @@ def main() -> int:
     parser.add_argument("--only", default="")
     only = parser.parse_args().only
     os.chdir(place())
-    thing("go2"), thing("checked")  # what takes long at the first time does it now
+    _ = thing("go2"), thing("checked")  # what takes long at the first time does it now
     cases = [*of_signatures(), *of_keys(), *of_options()]
     cases = [case for case in cases if only in case.where]
     wrong = {str(case): said for case in cases if (said := verdict(case))}

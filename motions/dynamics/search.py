@@ -30,7 +30,7 @@ AGREED = 1.05
 """Torque over what the plan may use at its speeds with which it is done: 0.89 of what the motors
 give in the middle of a step, all of it at its end (``PlanLimits``). Exact agreement takes many
 rounds."""
-FIRST_ANSWER = 0.6
+FIRST_ANSWER = 0.45
 """Processor time [s] of a search after which it says what binds so far."""
 _JOINT_RATES = slice(19 + 6, None)
 _log = logging.getLogger(__name__)

@@ -30,7 +30,7 @@ _HEADROOM = 0.9  # share of the limit that the forecast may reach
 _RENDER_SHARE = 0.75  # share of the progress bar for the pictures; the rest is the encoding
 
 
-@typed()
+@typed(late=True)
 def export_animation(
     shown: Recording | ReplayContent,
     path: Path,
