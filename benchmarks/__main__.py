@@ -25,7 +25,6 @@ COMMANDS: tuple[Command, ...] = (
     Command("probability", "benchmarks.probability", "is the stated chance the one that it has?"),
     Command("adversary", "benchmarks.adversary", "a search for motions that pass and fail"),
     Command("border", "benchmarks.border", "verdict and chance at the border of what is done"),
-    Command("nearest", "benchmarks.nearest", "the nearest to motions that the check refuses"),
     Command("solve", "benchmarks.solved_plans", "solve the library's dynamic plans, to ship them"),
     Command("gallery", "benchmarks.gallery", "play the library's motions, write their pictures"),
     Command("evidence", "benchmarks.evidence", "fill the table of docs/evidence.md"),
@@ -34,9 +33,10 @@ ALIASES = {"answers": "qp_infeasibility", "moonshots": "jump_limits", "trust": "
 """Former names of commands."""
 GONE = {
     "jump_limits": "docs/explanation/dynamics.md has its results, commit 55f699b its program",
-    "dynamics": "`nearest` measures what planning takes, commit 55f699b has the program",
+    "dynamics": "commit 55f699b has the program",
     "dynamic_motions": "`feasibility --rows dynamic` plays solved motions, and more of them",
     "false_negatives": "docs/feasibility.md has its results, commit 404d8b9 its program",
+    "nearest": "docs/motions.md has its results, commit 404d8b9 its program",
     "steps": "docs/motions.md has its results, commit 404d8b9 its program",
     "sweeps": "commit 55f699b has the program",
 }

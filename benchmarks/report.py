@@ -98,7 +98,7 @@ def summarise(scenarios: Sequence[Study], results: Results) -> Report:
 def summarise_metric(metric: Metric, trials: Mapping[int, TrialResult]) -> MetricResult:
     """One metric over the trials of its scenario, given by seed."""
     name = metric.name
-    ordered = {s: trial for s, trial in sorted(trials.items()) if name not in trial.not_asked}
+    ordered = dict(sorted(trials.items()))
     found = {s: trial.values[name] for s, trial in ordered.items() if name in trial.values}
     failures = {s: why for s, trial in ordered.items() if (why := trial.failure(name)) is not None}
     failures |= {s: f"{v} was measured" for s, v in found.items() if math.isnan(v)}

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from controller.motion_measurement import FULL
 from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, Trial, TrialRobot
 from go2_wbc.legs import LEGS
 from go2_wbc.plant import MujocoPlant
@@ -121,17 +120,6 @@ def standing_failure(robot: TrialRobot) -> str | None:
         return f"tilt {math.degrees(state.tilt):.1f} deg"
     least = float(state.foot_forces.min())
     return f"a foot carries {least:.1f} N only" if least < LOAD else None
-
-
-def loads(recorded: TruthRecording) -> dict[str, float]:
-    """Largest shares of a torque and a speed limit; share [%] of ticks of motors at their limit."""
-    model = RobotModel()
-    shares = recorded.torque_shares(model)
-    return {
-        "torque": float(shares.max()),
-        "speed": recorded.peak_speed_share(model),
-        "saturated": 100.0 * float((shares >= FULL).mean()),
-    }
 
 
 def com_height(window: TruthRecording, model: RobotModel | None = None) -> float:

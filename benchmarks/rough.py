@@ -241,17 +241,17 @@ def _boxes(seed: int) -> Terrain:
 SLOPE, ASLANT = math.radians(22.0), math.radians(20.0)
 _SLOPE, _DOWN = _at(Ramp(SLOPE, length=2.0)), _at(Stairs(0.13, 6, 0.31, way=DOWN))
 WAYS = (
-    Way("stairs-10", "6 stairs up and down, 10 cm, 0.3 m/s", _stairs(0.10), 0.3),
-    Way("stairs-13", "13 cm", _stairs(0.13), 0.3),
-    Way("stairs-14", "14 cm", _stairs(0.14), 0.3, bar=None),
-    Way("stairs-down", "6 stairs down, 13 cm, 0.3 m/s", _DOWN, 0.3, 3.5),
-    Way("stairs-aslant", "13 cm, aslant by 20 deg", _stairs(0.13), 0.3, heading=ASLANT),
+    Way("stairs-10", "6 stairs up and down, 10 cm, 0.5 m/s", _stairs(0.10)),
+    Way("stairs-13", "13 cm", _stairs(0.13)),
+    Way("stairs-14", "14 cm", _stairs(0.14)),
+    Way("stairs-down", "6 stairs down, 13 cm, 0.5 m/s", _DOWN, length=3.5),
+    Way("stairs-aslant", "13 cm, aslant by 20 deg", _stairs(0.13), heading=ASLANT),
     Way("blocks", "4 blocks of 14 cm, 0.5 m/s", _at(Blocks(0.14)), bar=0.9),
     Way("slope", "ramp of 22 deg up and down, 0.5 m/s", _SLOPE),
     Way("slope-back", "the same backwards", _SLOPE, -0.5, heading=math.pi),
     Way("waves", "5 waves of 8 cm, 0.5 m/s", _at(Waves(0.08))),
     Way("boxes", "boxes up to 12 cm, 0.5 m/s", _boxes, length=3.5),
-    Way("course", "random course of 12 m, 0.4 m/s", Course.drawn, 0.4, bar=None),
+    Way("course", "random course of 12 m, 0.5 m/s", Course.drawn, bar=None),
 )
 CASES = (
     Reversals("flat", "reversals"),

@@ -23,7 +23,7 @@ from go2_wbc.errors import ConfigError
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = Path("out/benchmarks")
 """Where finished trials are kept, in a folder for each benchmark."""
-_WORDS = ("failures", "notes", "not_asked")
+_WORDS = ("failures", "notes")
 """Of a trial, by row."""
 
 

@@ -81,15 +81,12 @@ class GO2Controller:
             viewer: open MuJoCo's viewer if there is a display.
             config: numbers of the engine, or a TOML file that overrides some.
             robot: "go2", "a1" or "go1"; by default that of the plant or the configuration.
-            urdf: another URDF of the robot instead of the installed one: what the controller takes
-                the robot for. Without ``plant`` the simulated robot is built from it, too.
+            urdf: of the robot that is driven, and without ``plant`` also of the simulated one.
             after_tick: is called after every control period, in the thread that ticks.
-            extra_tasks: tasks of your own in the whole-body QP, beside the built-in ones, whenever
-                it balances the robot. They are asked in the thread that ticks.
+            extra_tasks: of your own in the whole-body QP; they are asked in the thread that ticks.
 
         Raises:
-            ConfigError: for a namespace, configuration or task that is not valid, or without
-                ``realtime`` for a plant that needs it.
+            ConfigError: for a value that is not valid, or a plant that needs ``realtime``.
             SolverUnavailable: if the configured QP solver is unknown or not installed.
             DescriptionError: if the robot's files are missing, broken, or another robot's.
             PlantError: if the plant does not answer.
@@ -252,10 +249,8 @@ class GO2Controller:
         """Raise a front paw on three legs, hold it, tap, and come back to standing.
 
         Args:
-            side: "right" or "left".
             hold: time [s] for which the paw is held up, 0.5 to 30.
-            plan: what ``load_motion("high_five", side=side, hold=hold)`` was compiled to before;
-                by default it is compiled now.
+            plan: what this motion was compiled to before; by default it is compiled now.
 
         Raises:
             CommandError: for another side or time.
@@ -287,8 +282,7 @@ class GO2Controller:
             motion: a ``Playable``.
             times: how often, one after the other; what is measured is of the last one.
             check: with False also one that the robot cannot do is played, to see what happens.
-            allow_dynamic: let also a robot that may be a real one (``Plant.is_hardware``) play
-                motions with flight or on fewer than three feet. Simulated ones always do.
+            allow_dynamic: on hardware, too, motions with flight or on fewer than three feet.
 
         Raises:
             CommandError: for an unknown name, what is no motion, or ``times`` below 1.
@@ -356,8 +350,6 @@ class GO2Controller:
         seconds = arguments.time("seconds", seconds)
         self._call("wait", lambda: self._pilot.wait(seconds), allow_fallen=True)
 
-    # --- looking --------------------------------------------------------------------------
-
     @property
     def state(self) -> RobotState:
         """The newest measured state, a copy that cannot be written into."""
@@ -398,7 +390,6 @@ class GO2Controller:
         """Peaks and counts of the run so far."""
         return self._runner.loop.telemetry
 
-    @typed(error=CommandError)
     def recording(self, rate: float = 100.0) -> Recording:
         """The run so far (its last minutes), at about ``rate`` samples a second."""
         samples = self._runner.between_ticks(lambda: self.telemetry.samples(rate))

@@ -159,8 +159,16 @@ def _is_array(value: object, kind: Any) -> bool:  # noqa: ANN401
         array = np.asarray(value)
     except ValueError:  # of lists of several lengths
         return False
+    lengths = kind.dim_str.split()
     is_whole = array.dtype.kind in "iub" and "float64" in kind.dtypes
-    return isinstance(array.astype(float) if is_whole else array, kind)
+    if not (is_whole or array.dtype.name in kind.dtypes):
+        return False
+    if not all(length.isalnum() for length in lengths):  # of any shape
+        return True
+    return array.ndim == len(lengths) and all(
+        length == str(size) or not length.isdigit()
+        for length, size in zip(lengths, array.shape, strict=True)
+    )
 
 
 def _in_words(kind: object) -> str:

@@ -150,6 +150,7 @@ class Recording:
                 columns |= {f"{name}{i}": column for i, column in enumerate(values.T)}
         return pandas.DataFrame(columns)
 
+    @typed()
     def export(self, path: Path | str) -> Path:
         """Write it for other viewers: ``.mcap`` for Foxglove, ``.rrd`` for Rerun; gives its path.
 

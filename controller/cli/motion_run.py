@@ -24,7 +24,7 @@ from controller.cli.motion_preview import VIDEO_RATE
 from controller.cli.options import Html, Json, Mjcf, Numbers, output, video_file, whole
 from controller.cli.progress import ProgressLine
 from controller.modes import Mode
-from go2_wbc.errors import PlantError, StanceMismatch
+from go2_wbc.errors import ConfigError, PlantError, StanceMismatch
 
 if TYPE_CHECKING:
     from controller.go2_controller import GO2Controller
@@ -99,10 +99,15 @@ def run(
     from go2_wbc.recording import EXPORTS, viewer
     from go2_wbc.world import World
 
+    if scene.keyframe is not None and scene.mjcf is None:
+        raise ConfigError("--keyframe names one of a scene: give its file, too, by --mjcf")
     if files.export is not None and (extra := EXPORTS.get(files.export.suffix)):
         viewer(extra)  # what is missing is told before the work
     meant, numbers = the_motion(motion, set), read_config(config)
     world = replace(World.of(friction, payload), sensors=sensors)
+    plant = plant_in_world(
+        world, seed=seed, mjcf=scene.mjcf, keyframe=scene.keyframe, visuals=scene.viewer
+    )
     with ProgressLine(is_quiet=json) as line:
         line.update(0.0, f"checking {meant.name}")
         checker = checker_of(numbers, world, line)
@@ -110,9 +115,6 @@ def run(
     plan, report = checked.plan, checked.report
     if not force:
         report.raise_if_infeasible()
-    plant = plant_in_world(
-        world, seed=seed, mjcf=scene.mjcf, keyframe=scene.keyframe, visuals=scene.viewer
-    )
     with getting_ready(plan, plant, line, numbers, viewer=scene.viewer) as (go2, truth):
         result = measure_motion(go2, truth, plan, checker.model)
         recording = go2.recording()

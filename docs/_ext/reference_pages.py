@@ -95,7 +95,7 @@ def _directive(name: str, home: str, root: Path) -> str:
 
 def api_page(room: str, modules: list[str], root: Path = ROOT) -> str:
     """A page of the API reference in MyST, without what programs use."""
-    lines = [f"# {room}", ""]
+    lines = [f"# {room}, inside", ""]
     used = {(home, name) for names in offered(root).values() for name, home in names.items()}
     for name in modules:
         if (root / name.replace(".", "/")).is_dir():

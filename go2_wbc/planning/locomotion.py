@@ -29,6 +29,7 @@ from go2_wbc.planning.ground import (
     MOST_FRICTION,
     Slip,
     carry_ground,
+    greatest_speed,
     ground_at,
     ground_below,
     haste,
@@ -263,6 +264,9 @@ class LocomotionPlanner:
             snapshot: of this tick.
             friction: of the ground, as it is known; None if nothing is.
             has_slid: whether a foot has shown that, and not only that it is at least as high.
+
+        Raises:
+            CommandError: for a friction of 0 or less.
         """
         known = self._config.ground_friction if friction is None else friction
         if known <= 0.0:
@@ -305,8 +309,8 @@ class LocomotionPlanner:
     def is_slowed(self) -> bool:
         """Whether rough ground keeps the robot slower than it is told."""
         x, y = self._state.trunk.velocity[:2].tolist()
-        is_fast = bool(np.hypot(x, y) > self._config.rough.speed - TIE)
-        return is_fast and self._state.ground.rough_way > 0.0
+        most = greatest_speed(self._state.ground, self._walk.config.rough)
+        return bool(np.hypot(x, y) > most - TIE)
 
     @property
     def is_stepping(self) -> bool:

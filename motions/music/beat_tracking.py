@@ -72,7 +72,8 @@ class Beats:
         duration: length [s] of the song.
         agreement: how regular it is: its mean correlation with itself 1 to 8 beats later, at
             most 1.
-        metre: beats of a bar, 3 for a waltz; 1 where no bars are known.
+        metre: beats of a bar, 3 for a waltz, 6 for one that is counted twice as fast; 1 where no
+            bars are known.
         downbeat: number of the beat, from 0, on which the first bar begins.
     """
 

@@ -12,8 +12,9 @@ from jaxtyping import Float, Int
 
 from motions.music.songs import RATE, Sound
 
-HEARD = (4, 3)
-"""Metres that are told apart; the first one where nothing tells."""
+HEARD = (4, 3, 6)
+"""Metres that are told apart, 6 of a waltz that is counted twice as fast as it is played; the first
+one where nothing tells."""
 WINDOW, HOP = 2048, 512
 """Samples of a frame (93 ms), long enough to tell tones apart, and from one to the next."""
 BASS = slice(1, 15)

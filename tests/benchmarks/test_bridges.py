@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.bridges.command import STUDIES, TESTED
+from benchmarks.bridges.command import STUDIES
 from benchmarks.study import chosen_studies
 from controller.cli.common import ExitCode
 
@@ -37,10 +37,3 @@ def test_without_the_extra_the_line_that_installs_it_is_named(
     assert 'pip install "go2-wbc[unitree]"' in complaint
     assert "Traceback" not in complaint
     assert not results_folder.exists()
-
-
-def test_what_tests_do_now_is_told_with_the_test(capsys: pytest.CaptureFixture[str]) -> None:
-    for name, file in TESTED.items():
-        assert main(["bridges", name]) == ExitCode.USAGE
-        assert f"pytest {file}" in capsys.readouterr().err
-        assert (Path(__file__).resolve().parents[2] / file).is_file()

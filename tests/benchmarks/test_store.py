@@ -18,7 +18,7 @@ from tests.benchmarks.support import fake, measure_well
 
 TROT = Study("trot", {"": (("a", "", ""), ("b", "", ""))}, measure_well, prefix="")
 FIRST = TrialResult({"a": 0.1 + 0.2, "b": math.inf}, {"b": "it fell"}, "said no", {"a": "x"})
-SECOND = TrialResult({"a": math.nan, "b": -0.0}, not_asked={"a": "no plan"})
+SECOND = TrialResult({"a": math.nan, "b": -0.0}, notes={"a": "no plan"})
 
 
 class Interrupted:

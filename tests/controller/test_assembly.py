@@ -69,8 +69,13 @@ def test_a_refused_configuration_closes_the_robot_that_was_made_for_it(
 ) -> None:
     closed: list[MujocoPlant] = []
     monkeypatch.setattr(MujocoPlant, "close", lambda plant: closed.append(plant))
+
+    def refuse(*_: object, **__: object) -> None:
+        raise ConfigError("no")
+
+    monkeypatch.setattr("controller.go2_controller.build_pilot", refuse)
     with pytest.raises(ConfigError):
-        GO2Controller(config=Config(backend="magic"))
+        GO2Controller()
     assert len(closed) == 1
 
 

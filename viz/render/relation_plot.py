@@ -12,6 +12,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output
 from viz.style import ACCENT, INK, MUTED, PLOT_SUFFIXES, STYLE, TRACK, save_figure
@@ -22,6 +23,7 @@ _LINE, _GRID = (3.4, 2.2), (5.2, 4.2)  # [inch] width and height of a panel
 _DARK = 0.6  # of a grid's colours: white letters above it
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 class Relation:
     """An outcome over one parameter, or two.
@@ -45,6 +47,7 @@ class Relation:
     dots: Float[np.ndarray, "n 2"]
 
 
+@typed()
 def export_relations(relations: Sequence[Relation], path: Path, *, title: str) -> Path:
     """Write a figure with a panel for each relation; gives the absolute path.
 

@@ -257,7 +257,9 @@ class MujocoPlant(Plant):
             mujoco.mj_step1(model, data)
         self._tau = total / self._substeps if shares is None else total * shares / self._substeps
         self._ticks += 1
-        self._check_physics()
+        if np.count_nonzero(self._warnings):
+            raised = [mujoco.mju_warningText(int(i), 0) for i in np.flatnonzero(self._warnings)]
+            raise PlantError(f"physics failed at t={self.time:.3f} s: {'; '.join(raised)}")
         self._sense()
 
     def imu(self) -> ImuSample:
@@ -291,9 +293,7 @@ class MujocoPlant(Plant):
         """Breaks a part of the robot, for tests and experiments.
 
         Args:
-            kind: one of ``go2_wbc.plant.faults.FaultKind``: ``"motor"``, ``"encoder"``,
-                ``"encoder_stuck"``, ``"foot_force"``, ``"gyro"``, ``"accelerometer"``,
-                ``"foot_held"``, ``"not_a_number"``, ``"lost_packets"``.
+            kind: a value of ``go2_wbc.plant.faults.FaultKind``, such as ``"motor"``.
             part: a joint (``"FL_calf_joint"``), a foot (``"FL_foot"``) or an axis (``"x"``).
             at: plant time [s]; now, unless said.
             value: what the part gives, or errs by; see ``FaultKind``.
@@ -472,13 +472,6 @@ class MujocoPlant(Plant):
         rows = (contact.geom, contact.efc_address, contact.dim, data.efc_force)
         bin_forces(*rows, codes, self._is_elliptic, forces)
         return forces
-
-    def _check_physics(self) -> None:
-        """Raises ``PlantError`` if MuJoCo warned about anything."""
-        counts = self._warnings
-        if np.count_nonzero(counts):
-            raised = [mujoco.mju_warningText(int(i), 0) for i in np.flatnonzero(counts)]
-            raise PlantError(f"physics failed at t={self.time:.3f} s: {'; '.join(raised)}")
 
 
 def _numbers_of(command: JointCommand) -> Float[np.ndarray, "5 12"]:

@@ -107,7 +107,10 @@ def test_the_robot_goes_slowly_on_rough_ground_and_for_a_way_after_it() -> None:
 
     np.testing.assert_array_equal(told(), asked)
     ground.roughness = 1.01 * ROUGH
-    slowly = asked * CONFIG.speed / 1.5
+    np.testing.assert_allclose(told(), asked * CONFIG.high_speed / 1.5)  # the first step
+    np.testing.assert_allclose(told(), asked * CONFIG.speed / 1.5)
+    ground.roughness = 1.01 * CONFIG.high
+    slowly = asked * CONFIG.high_speed / 1.5
     np.testing.assert_allclose(told(), slowly)
     ground.roughness = 0.99 * ROUGH
     np.testing.assert_allclose(told(), slowly)

@@ -64,6 +64,8 @@ def test_a_waltz_is_a_waltz(metre: int, seed: int, tmp_path: Path) -> None:
     firsts = found.times[found.downbeat :: metre]
     assert np.abs(song.beats[::metre][:, None] - firsts).min(axis=0).max() < NEAR
     assert beats(saved(song, tmp_path), 7 - metre).metre == 7 - metre
+    cut = song.samples[round((song.beats[1] - 0.2) * RATE) :]  # it begins on the second beat
+    assert beats(sound(cut, tmp_path)).downbeat == metre - 1
 
 
 def test_a_file_of_two_channels_at_another_rate_is_read(tmp_path: Path) -> None:

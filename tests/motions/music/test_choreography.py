@@ -101,6 +101,9 @@ def test_a_waltz_has_moves_of_three_and_a_fast_one_is_danced_in_ones() -> None:
     assert not {item.move.name for item in other} & set(WALTZ)
     fast = steady(170.0, metre=3, downbeat=1)
     assert pulses_of(fast).times == pytest.approx(fast.times[1::3])
+    twice = pulses_of(steady(140.0, metre=6, downbeat=1))  # counted twice as fast as it is played
+    assert twice.times == pytest.approx(steady(140.0).times[1::2])
+    assert (twice.bar, twice.downbeat) == (3, 0)
 
 
 def test_where_no_move_may_begin_is_a_rest() -> None:
