@@ -52,9 +52,10 @@ test-unitree: $(VENV)/.stamp-unitree $(VENV)/.stamp-models ## what needs other p
 		tests/scenarios/test_other_models.py \
 		'tests/test_examples.py::test_an_example_runs_and_prints_its_point[30_sport_client]' $(ARGS)
 
-test-cluster: $(VENV)/.stamp-cluster ## the tests of sweeps, on a Ray cluster of two nodes too
+test-cluster: $(VENV)/.stamp-cluster ## the tests of sweeps, on a Ray cluster of two nodes too; of Rerun files
 	GO2_WBC_REQUIRE_CLUSTER=1 \
-	$(BIN)/python -m pytest -n 0 tests/controller/sweeps tests/controller/cli/test_sweep.py $(ARGS)
+	$(BIN)/python -m pytest -n 0 tests/controller/sweeps tests/controller/cli/test_sweep.py \
+		tests/viz/replay/test_other_viewers.py $(ARGS)
 
 test-dist: $(VENV)/.stamp-dev ## build wheel and sdist, use each in an empty environment
 	tests/distribution.sh $(BIN)/python
@@ -69,8 +70,9 @@ format: $(VENV)/.stamp-dev ## fix what lint and formatting can fix
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-docs: $(VENV)/.stamp-dev ## build the documentation site in docs/_build/html
+docs: $(VENV)/.stamp-dev ## build the documentation site in docs/_build/html, follow its links
 	$(BIN)/python -m sphinx -W --keep-going -q docs docs/_build/html
+	GO2_WBC_SITE=docs/_build/html $(BIN)/python -m pytest -n 0 -q tests/test_site.py
 
 bench: $(VENV)/.stamp-run ## run a benchmark: make bench ARGS='behaviour --quick'
 	$(BIN)/python -m benchmarks $(ARGS)
@@ -116,7 +118,7 @@ $(VENV)/.stamp-models: $(VENV)/.stamp-dev
 	@touch $@
 
 $(VENV)/.stamp-cluster: $(VENV)/.stamp-dev
-	$(call install,.[sweep$(COMMA)cluster])
+	$(call install,.[sweep$(COMMA)cluster$(COMMA)rerun])
 	@touch $@
 
 $(VENV)/.stamp-run: pyproject.toml $(VENV)/.stamp-venv

@@ -1,7 +1,5 @@
 """``python -m benchmarks NAME``: runs one benchmark."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 
@@ -13,7 +11,6 @@ COMMANDS: tuple[Command, ...] = (
     Command("feasibility", "benchmarks.feasibility", "the feasibility check against physics"),
     Command("bridges", "benchmarks.bridges.command", "ROS 2 and Unitree's protocol, by processes"),
     Command("qp_infeasibility", "benchmarks.qp_infeasibility", "the QP that contradicts itself"),
-    Command("steps", "benchmarks.steps", "where authored steps and walks end"),
     Command("locomotion", "benchmarks.locomotion", "gaits at their speeds"),
     Command("envelopes", "benchmarks.envelopes", "the greatest speed of each gait, and store it"),
     Command("balance", "benchmarks.balance", "pushes, drops, gait changes; falls noticed"),
@@ -25,25 +22,22 @@ COMMANDS: tuple[Command, ...] = (
     Command("golden", "benchmarks.golden", "is every tick what it was, to the last bit?"),
     Command("plain", "benchmarks.plain", "does compiled code do what its own Python does?"),
     Command("speed", "benchmarks.speed", "processor time of the QP and of a control tick"),
-    Command("dynamic_motions", "benchmarks.dynamic_motions", "jumps, hops and rears in physics"),
     Command("probability", "benchmarks.probability", "is the stated chance the one that it has?"),
-    Command("false_negatives", "benchmarks.false_negatives", "do motions that passed fall?"),
     Command("adversary", "benchmarks.adversary", "a search for motions that pass and fail"),
     Command("border", "benchmarks.border", "verdict and chance at the border of what is done"),
-    Command("nearest", "benchmarks.nearest", "the nearest to motions that the check refuses"),
     Command("solve", "benchmarks.solved_plans", "solve the library's dynamic plans, to ship them"),
     Command("gallery", "benchmarks.gallery", "play the library's motions, write their pictures"),
     Command("evidence", "benchmarks.evidence", "fill the table of docs/evidence.md"),
 )
-ALIASES = {
-    "answers": "qp_infeasibility",
-    "moonshots": "jump_limits",
-    "trust": "false_negatives",
-}
+ALIASES = {"answers": "qp_infeasibility", "moonshots": "jump_limits", "trust": "false_negatives"}
 """Former names of commands."""
 GONE = {
     "jump_limits": "docs/explanation/dynamics.md has its results, commit 55f699b its program",
-    "dynamics": "`nearest` measures what planning takes, commit 55f699b has the program",
+    "dynamics": "commit 55f699b has the program",
+    "dynamic_motions": "`feasibility --rows dynamic` plays solved motions, and more of them",
+    "false_negatives": "docs/feasibility.md has its results, commit 404d8b9 its program",
+    "nearest": "docs/motions.md has its results, commit 404d8b9 its program",
+    "steps": "docs/motions.md has its results, commit 404d8b9 its program",
     "sweeps": "commit 55f699b has the program",
 }
 """What is no command any more, and where it is."""

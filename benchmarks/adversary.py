@@ -7,34 +7,28 @@ refuses is halved, which leads along the border of what it passes. The search kn
 verdict and its chance, and of physics what was played; limits, margins and equations it does not.
 """
 
-from __future__ import annotations
-
-import argparse
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from jaxtyping import Float
 
 from benchmarks.adversary_motions import COUNT, FAMILIES, Numbers
-from benchmarks.command import add_sweep, positive, publish, run_sweep
+from benchmarks.command import Benchmark
+from benchmarks.study import Study, TrialResult
 from benchmarks.validation_set.physics import play
-from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.motion_failures import failures_of, shares_of
 from controller.motion_measurement import MotionMeasurement
-from controller.sweeps.rows import Row
-from controller.sweeps.summary import rate_interval
-from controller.sweeps.trials import TrialFailed
+from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.errors import MotionError
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker
 
-PLAYS, PLAYS_OF_A_SEARCH = 500, 20
-STATED, NOT_DONE = 0.95, 0.02
-"""Chance from which on a pass counts, and the greatest share of those plays that is not done."""
+PLAYS = 20  # Of a search
+STATED = 0.95
+"""Chance from which on a pass counts."""
 FIRST = 9000
 """First seed that judges: whoever mends the check looks at lower ones only."""
 MOST_CHECKS, HALVINGS = 60, 3
@@ -45,55 +39,12 @@ WIDER, CLOSER = 1.5, 0.9
 """Factors of that after a change for the worse, and after another: even at one in five."""
 FALL, FAILED = 10.0, 2.0
 """What a fall counts, and at least what ``play`` calls not done; 1 is just not as written."""
-COUNTED = ("plays", "wrong", "fell")
-EXAMPLES = """
-python -m benchmarks adversary             4 x 500 plays: half an hour,
-                                           2 cores
-python -m benchmarks adversary --plays 40 --families trots static
-python -m benchmarks adversary --first 0   seeds to mend the check by
-"""
-
-
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``adversary``."""
-    parser = add_parser(
-        subparsers,
-        "adversary",
-        "Searches for motions that the check passes at a high chance and that fail in\n"
-        "MuJoCo. Goes on where it was interrupted. Exit code 0 if none fell and 2 % at\n"
-        "most of each family were not done, else 1.",
-        examples=EXAMPLES,
-    )
-    parser.add_argument(
-        "--plays", metavar="N", type=positive, default=PLAYS,
-        help="in each family, default %(default)s",
-    )  # fmt: skip
-    parser.add_argument(
-        "--families", metavar="NAME", nargs="+", choices=FAMILIES, default=list(FAMILIES),
-        help=f"{', '.join(FAMILIES)}; default all",
-    )  # fmt: skip
-    parser.add_argument(
-        "--first", metavar="SEED", type=int, default=FIRST, help="default %(default)s"
-    )
-    add_sweep(parser, jobs=2)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Search with what is not kept yet, count the finds."""
-    rows: list[Row] = []
-    searches, lost = -(-args.plays // PLAYS_OF_A_SEARCH), dict[int, str]()
-    for name in args.families:
-        first = list(FAMILIES).index(name) * SEEDS + args.first
-        result = run_sweep(args, search, searches, first_seed=first)
-        rows += result.rows
-        lost |= result.failures
-    counts = counted(rows)
-    is_ok = is_met(counts) and not lost
-    publish(args, {"passed": is_ok, "families": counts, "lost": lost}, render(rows))
-    return ExitCode.OK if is_ok else ExitCode.FAILED
-
-
-SEEDS = 1_000_000  # Of a family; then those of the next begin
+ROWS = (
+    ("fell", "fell", "<= 0"),
+    ("wrong", "not done", "<= 2 %"),
+    ("plays", "plays of a search", ""),
+    ("worst", "worst, of what is allowed", ""),
+)
 
 
 @dataclass(slots=True)
@@ -156,23 +107,22 @@ class Search:
         return None
 
 
-def search(seed: int) -> dict[str, object]:
-    """The row of a search: how many were played and went wrong, and those that did."""
-    number, start = divmod(seed, SEEDS)
-    family = list(FAMILIES)[number]
-    one = Search(family, np.random.default_rng([start, number]))
-    while len(one.played) < PLAYS_OF_A_SEARCH and one.go_on():
+def measure(trial: Trial, found: TrialResult, family: str) -> None:
+    """One search: how many of its plays went wrong."""
+    number = list(FAMILIES).index(family)
+    one = Search(family, np.random.default_rng([FIRST + trial.seed, number]))
+    while len(one.played) < PLAYS and one.go_on():
         pass
-    wrong = [attempt for attempt in one.played if attempt.harm]
-    told = [(a.chance, "; ".join(a.harm), np.round(a.numbers, 5).tolist()) for a in wrong]
-    return {
-        "family": family,
-        "plays": len(one.played),
-        "wrong": len(wrong),
-        "fell": sum("fell" in attempt.harm for attempt in wrong),
+    wrong, plays = [attempt for attempt in one.played if attempt.harm], len(one.played)
+    found.values = {
+        "fell": float(sum("fell" in attempt.harm for attempt in wrong)),
+        "wrong": 100.0 * len(wrong) / max(plays, 1),
+        "plays": float(plays),
         "worst": max((attempt.worst for attempt in one.played), default=0.0),
-        "finds": json.dumps(told),
     }
+    for k, a in enumerate(wrong):
+        numbers = np.round(a.numbers, 5).tolist()
+        found.notes[f"find {k}"] = f"{a.chance:.3f} {'; '.join(a.harm)} {numbers}"
 
 
 def passed(
@@ -208,39 +158,16 @@ def checker() -> FeasibilityChecker:
     return FeasibilityChecker(RobotModel())
 
 
-Counts = dict[str, dict[str, int]]
-"""By family: searches, plays, and of these what was wrong, and fell."""
-
-
-def counted(rows: Sequence[Row]) -> Counts:
-    """What came of the searches."""
-    counts: Counts = {}
-    for row in rows:
-        own = counts.setdefault(str(row["family"]), dict.fromkeys(("searches", *COUNTED), 0))
-        own["searches"] += 1
-        for name in COUNTED:
-            own[name] += int(row[name])
-    return counts
-
-
-def is_met(counts: Counts) -> bool:
-    """Whether no family has a fall, or too much that is not done."""
-    return bool(counts) and all(
-        not own["fell"] and own["wrong"] <= NOT_DONE * own["plays"] for own in counts.values()
-    )
-
-
-def render(rows: Sequence[Row]) -> str:
-    """A line for every family, and the first find of every search, at most 80 columns wide."""
-    lines = [f"{'family':<12}{'searches':>9}{'played':>8}{'fell':>7}{'not done':>10}", "-" * 80]
-    counts = counted(rows)
-    for family, own in counts.items():
-        low, high = rate_interval(own["wrong"], max(own["plays"], 1))
-        told = f"{own['searches']:>9}{own['plays']:>8}{own['fell']:>7}{own['wrong']:>10}"
-        lines.append(f"{family:<12}{told}   {low:.3f}-{high:.3f}")
-    lines.append("-" * 80)
-    for row in rows:
-        finds = json.loads(str(row["finds"]))
-        lines += [f"seed {row['seed']} {p:.3f} {harm:.60}" for p, harm, _ in finds[:1]]
-    bar = f"bar 0 fell, {NOT_DONE:.0%} not done: {'ok' if is_met(counts) else 'NO'}"
-    return "\n".join([*lines, f"passed at a chance of {STATED} or more; {bar}"])
+STUDIES = tuple(
+    Study(name, {f"{name}, passed at {STATED}": ROWS}, partial(measure, family=name), sensors=None)
+    for name in FAMILIES
+)
+BENCHMARK = Benchmark(
+    "adversary",
+    "Searches for motions that the check passes at a high chance and that fail in\n"
+    f"MuJoCo; a seed is a search of {PLAYS} plays.",
+    STUDIES,
+    takes="half an hour on two cores",
+    examples=("--seeds 25", "--rows trots static --seeds 2"),
+)
+register, run = BENCHMARK.register, BENCHMARK.run

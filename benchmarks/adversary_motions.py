@@ -5,8 +5,6 @@ small change of them is a small change of the motion, mostly. They share nothing
 validation set. ``size`` multiplies how far the motion goes from standing, and nothing else.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
 

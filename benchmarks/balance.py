@@ -15,8 +15,6 @@ from 30000 to 63999; those judged begin at ``FIRST_SEED``.
   ``benchmarks.disturbed``.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import partial

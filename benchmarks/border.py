@@ -5,8 +5,6 @@ drawn, and two beside the size at which physics changes its mind, which is bisec
 border is where a verdict is hard, and where a search leads.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

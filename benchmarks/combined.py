@@ -14,8 +14,6 @@ Numbers were chosen on seeds 0 to 99; those that are judged begin at ``FIRST_SEE
   the recording was full.
 """
 
-from __future__ import annotations
-
 import math
 import resource
 from functools import partial

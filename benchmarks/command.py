@@ -1,7 +1,5 @@
 """What the commands of the benchmarks share: their options, running studies, what is told."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys
@@ -17,7 +15,6 @@ from benchmarks.study import IDEAL, IMU, Results, Study, Task, chosen_studies, r
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
 from controller.cli.progress import ProgressLine
 from controller.cli.sweep import tell
-from controller.sweeps.rows import Row
 from controller.sweeps.run import SweepResult, sweep
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
@@ -189,7 +186,6 @@ def run_sweep(
     n: int,
     *,
     first_seed: int = 0,
-    is_enough: Callable[[Sequence[Row]], bool] | None = None,
 ) -> SweepResult:
     """Run those of ``n`` seeds whose rows are not kept yet, and tell of the progress.
 
@@ -204,8 +200,7 @@ def run_sweep(
     except OSError as error:
         raise ConfigError(f"cannot make the folder of {rows}: {error.strerror}") from error
     with ProgressLine() as line:
-        options = {"workers": args.jobs, "out": rows, "keep_going": True, "is_enough": is_enough}
-        options["first_seed"] = first_seed
+        options = {"workers": args.jobs, "out": rows, "keep_going": True, "first_seed": first_seed}
         return sweep(trial, n, **options, on_progress=lambda progress: tell(line, progress))
 
 

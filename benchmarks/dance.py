@@ -5,8 +5,6 @@ to a file and found again: what is judged is the whole way from the file to the 
 finder and the lead of the choreography were tuned on songs with seeds below 100.
 """
 
-from __future__ import annotations
-
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,18 +17,20 @@ from controller.motion_measurement import during_motion
 from controller.sweeps.trials import Trial, TrialRobot
 from motions import FeasibilityChecker
 from motions.music import Beats, Song, beats, click_track, danced, feasible_dance, made_song
+from motions.music.dance_timing import ON_THE_BEAT
 
 SECONDS = 30.0  # Length [s] of a song
 TEMPI = (62.0, 178.0)  # Tempi [beats/min] that are drawn
+METRES = {"clicks": 4, "song": 4, "waltz": 3}  # Beats of a bar, by kind
 FIRST_SONG = 5000  # Seed of the first song that is judged
 
 
 def song_of(kind: str, seed: int) -> Song:
-    """The song of a trial: clicks, or a made song."""
+    """The song of a trial: clicks, or a made song, perhaps a waltz."""
     bpm = float(np.random.default_rng([FIRST_SONG, seed]).uniform(*TEMPI))
     if kind == "clicks":
         return click_track(bpm, SECONDS)
-    return made_song(bpm, SECONDS, FIRST_SONG + seed)
+    return made_song(bpm, SECONDS, FIRST_SONG + seed, METRES[kind])
 
 
 def heard(song: Song) -> Beats:
@@ -44,6 +44,7 @@ ROWS = (
     ("on_beat", "accents within 40 ms", ">= 0.95"),
     ("late", "accent off its beat, mean", "ms"),
     ("heard", "heard beat off, mean", "ms"),
+    ("bars", "bars begun where heard", "share"),
 )
 """What is counted in every trial."""
 
@@ -54,7 +55,8 @@ def measure(trial: Trial, found: TrialResult, kind: str) -> None:
     - moves: of the dance;
     - accents within 40 ms: of a true beat; one that did not happen is none of them;
     - accent off its beat: of those that happened;
-    - heard beat off the true: of the pulses on which the dance is composed.
+    - heard beat off the true: of the pulses on which the dance is composed;
+    - bars begun where heard: of those of the dance, the share within 40 ms of a true one.
     """
     song = song_of(kind, trial.seed)
     checker = _checker()
@@ -66,11 +68,13 @@ def measure(trial: Trial, found: TrialResult, kind: str) -> None:
         recorded = during_motion(robot.go2, robot.truth, checked.plan.name)
     result = danced(recorded, dance)
     off = np.abs(dance.pulses[1:, None] - song.beats).min(axis=1)
+    first = np.abs(dance.pulses[dance.downbeat :: dance.bar, None] - song.beats[:: METRES[kind]])
     found.values = {
         "moves": float(len(dance.moves)),
         "on_beat": result.share_on(song.beats),
         "late": 1000.0 * float(np.nanmean(np.abs(result.errors(song.beats)))),
         "heard": 1000.0 * float(off.mean()),
+        "bars": float((first.min(axis=1) <= ON_THE_BEAT).mean()),
     }
 
 
@@ -85,6 +89,7 @@ STUDIES = tuple(
     for kind, item in (
         ("clicks", "dance to a click track, 30 s"),
         ("song", "dance to a made song, 30 s"),
+        ("waltz", "dance to a made waltz, 30 s"),
     )
 )
 """In the order of the report."""

@@ -1,7 +1,5 @@
 """The whole demo: does it work on every seed, and does every True hold in the simulator?"""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

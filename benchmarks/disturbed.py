@@ -10,8 +10,6 @@ A fall is, in truth, the trunk of a robot that had risen on the ground for ``STU
 An error that a call must not raise ends the benchmark.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

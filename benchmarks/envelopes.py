@@ -8,8 +8,6 @@ the planner's default numbers.
 those that ``benchmarks.locomotion`` judges by.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Sequence

@@ -7,8 +7,6 @@ how a value is printed, and what the closest peer reaches. A row has one metric 
 or two: on the true state and on the robot's own sensors.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Mapping

@@ -6,8 +6,6 @@ says. Families of motions lie in one half each: thresholds of the check may be s
 only, and of the test half no single motion is shown.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence
@@ -15,7 +13,6 @@ from functools import cache, partial
 
 from benchmarks.command import RESULTS, add_options, measure_all, positive, publish
 from benchmarks.study import Study, TrialResult
-from benchmarks.validation_set.causes import CAUSES, examples, render_causes
 from benchmarks.validation_set.drawing import TEST
 from benchmarks.validation_set.physics import (
     BORDER,
@@ -40,7 +37,7 @@ from controller.sweeps.trials import Trial
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker
 
-EXAM, DYNAMIC, CAUSES_ROW, REFUSED = "exam", "dynamic", "causes", "refused"
+EXAM, DYNAMIC, REFUSED = "exam", "dynamic", "refused"
 THRESHOLD = 0.95
 """Least precision and recall of refusals and of passes, test half, strict outcome."""
 BORDER_PRECISION, BORDER_RECALL = 0.85, 0.90
@@ -50,7 +47,6 @@ LEAST_DYNAMIC = 100
 EXAMPLES = """
 python -m benchmarks feasibility              the exam: 20 minutes, 2 cores
 python -m benchmarks feasibility --motions 60
-python -m benchmarks feasibility --rows causes
 python -m benchmarks feasibility --rows dynamic --half test
 python -m benchmarks feasibility --wrong      also what is wrong, train half
 python -m benchmarks feasibility --sensors imu
@@ -91,11 +87,6 @@ def run(args: argparse.Namespace) -> int:
     seeds = [n for n, one in enumerate(asked) if args.half in (None, one.family.half)]
     seeds = seeds[: args.motions]
     cases = _measured(args, seeds)
-    if args.rows == CAUSES_ROW:
-        wrong = sum(case.is_wrong for case in cases)
-        rows = [{"name": c.name, "refused": c.refusal, "wrong": c.outcome.strict} for c in cases]
-        publish(args, {"wrong": wrong, "cases": rows}, render_causes(cases))
-        return ExitCode.FAILED if wrong else ExitCode.OK
     judge = judged if args.rows == EXAM else judged_dynamic
     is_ok, verdict = judge(cases, len(seeds))
     values = {"passed": is_ok, "scores": {n: s.as_dict() for n, s in scores(cases).items()}}
@@ -118,7 +109,7 @@ def dynamic() -> list[Question]:
     return dynamic_questions(read_borders())
 
 
-QUESTIONS = {EXAM: exam, DYNAMIC: dynamic, CAUSES_ROW: examples}
+QUESTIONS = {EXAM: exam, DYNAMIC: dynamic}
 
 
 @cache
@@ -133,7 +124,7 @@ def ask(trial: Trial, found: TrialResult, of: str) -> None:
     Args:
         trial: its seed is the number of the motion.
         found: what is filled.
-        of: the exam, its dynamic motions and more, or the known causes.
+        of: the exam, or its dynamic motions and more.
     """
     question, checker = QUESTIONS[of]()[trial.seed], _checker()
     plan = question.plan(checker.model)
@@ -149,7 +140,7 @@ def ask(trial: Trial, found: TrialResult, of: str) -> None:
 def study_of(of: str) -> Study:
     """The trials of these motions, with borders as they are now."""
     return Study(
-        of if of == CAUSES_ROW else f"{of} {borders_version()}",
+        f"{of} {borders_version()}",
         {
             "verdict": ((REFUSED, "refused by the check", ""),),
             "physics": [(kind, f"went wrong, {kind}", "") for kind in OUTCOMES],
@@ -175,11 +166,10 @@ def case_of(question: Question, one: TrialResult) -> Case:
     def reasons(row: str) -> tuple[str, ...]:
         return tuple(filter(None, one.notes[row].split(_BETWEEN)))
 
-    family, is_cause = question.family, question.stratum == CAUSES
+    family = question.family
     refusal = reasons(REFUSED) or (("refused",) if one.values[REFUSED] else ())
     outcome = MotionFailures(*map(reasons, OUTCOMES))
-    half = CAUSES if is_cause else family.half
-    return Case(question.name, half, question.stratum, family.is_dynamic, refusal, outcome)
+    return Case(question.name, family.half, question.stratum, family.is_dynamic, refusal, outcome)
 
 
 def judged(cases: Sequence[Case], asked: int) -> tuple[bool, str]:

@@ -1,40 +1,33 @@
 """``python -m benchmarks gallery``: the pictures of the documentation, all of runs in MuJoCo.
 
-Writes ``gallery.md`` and ``images/gallery/NAME.webp``: the start, and the moments in which the
-robot, as measured, is farthest from it and from each other. With ``--film`` it writes
+Writes ``gallery.md`` and ``images/gallery/NAME.avif``, loops of the motions as they were measured:
+AVIF takes a quarter of a WebP that moves (Pillow 11.3 or later). With ``--film`` it writes
 ``images/demo.webp`` instead: the README's film, the demo from the first steps on.
 """
 
-from __future__ import annotations
-
 import argparse
-from collections.abc import Sequence
+import io
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image
 
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.demo import run_demo
 from controller.go2_controller import GO2Controller
-from go2_wbc.errors import MotionError
+from go2_wbc.errors import ConfigError, MotionError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.recording import Recording
 from motions import Motion, Timeline, find_motion, motion_names
 from viz.render.animation import encoded_webp, frame_times
 from viz.render.frame_renderer import FrameRenderer, ShotStyle
-from viz.render.robot_meshes import PosedRobot, load_robot_visuals
-from viz.style import INK
 
-MOMENTS = 3  # Panels in a line; a long motion has two lines of them
-LONG = 15.0  # Length [s] from which on a motion is long
-FAR = 0.3
-"""Share of the greatest deviation from the start that a pose must have to be shown."""
+LONG, FAST = 15.0, 2.0  # Length [s] from which on a motion is long, and is shown this much faster
 RATE = 25.0  # Samples of the recording a second [Hz]
-PANEL = (400, 300)  # Width and height [px] of a panel
-GAP = 6  # Width [px] of the gap between panels
+LOOP_RATE = 10.0  # Pictures in a second of a loop
+QUALITY, EFFORT = 50, 6  # Of AVIF: 0 to 100; 10 to 0
 STYLE = ShotStyle(
-    size=PANEL,
+    size=(320, 240),
     azimuth=np.deg2rad(-42.0),
     elevation=np.deg2rad(20.0),
     sway=0.0,
@@ -42,10 +35,10 @@ STYLE = ShotStyle(
     turn_smoothing=20.0,
     distance=1.5,
     detail=0.003,
-    samples=3,
+    samples=2,
 )
-"""A camera that nearly stands still, so that what differs between the panels is the robot."""
-SIZE_LIMIT = 60_000  # Largest picture [bytes]
+"""A camera that nearly stands still, so that what moves is the robot."""
+SIZE_LIMIT = 400_000  # Largest loop [bytes]
 FILM_SPEED, FILM_RATE = 2.0, 10.0
 """Seconds of the run in a second of the film, and pictures in a second of it."""
 LEAD = 0.6
@@ -62,16 +55,12 @@ FILM_STYLE = ShotStyle(
 )
 """A camera that sees the robot from the left at first, and its face after the turn."""
 FILM_SIZE_LIMIT = 700_000  # Largest film [bytes]
-TRUNK_POINTS = np.array([[0.35, 0.0, 0.0], [-0.25, 0.0, 0.0], [0.0, 0.0, 0.15]])
-"""Nose, tail, and a point [m] above the trunk, in its frame: they tell attitudes apart."""
-
 HEAD = """# Gallery
 
 <!-- written by `python -m benchmarks gallery docs`, not by hand -->
 
-Every motion of the library. A picture shows the start and the most telling moments of one run in
-MuJoCo under `GO2Controller.play`, with the time since the start of the motion. An orange arrow is
-the measured normal force of a foot, 2 mm a newton. `go2-wbc list` prints the parameters,
+Every motion of the library, as it was measured in MuJoCo under `GO2Controller.play`. An orange
+arrow is the normal force of a foot, 2 mm a newton. `go2-wbc list` prints the parameters,
 `go2-wbc run NAME --html FILE` writes a run as a page that can be turned in 3D. How to write such a
 motion: the [tutorial](tutorial.md).
 """
@@ -108,14 +97,13 @@ def run(args: argparse.Namespace) -> int:
         robot.stand()
         for line in timelines:
             recording = played(line, robot)
-            name = args.folder / "images" / "gallery" / f"{line.name}.webp"
-            _write(name, picture(recording, telling_rows(recording)))
+            _write(args.folder / "images" / "gallery" / f"{line.name}.avif", loop(recording))
     write_atomically(target, page().encode())
     return ExitCode.OK
 
 
 def _write(name: Path, content: bytes) -> None:
-    write_atomically(checked_output(name, (".webp",)), content)
+    write_atomically(checked_output(name, (".webp", ".avif")), content)
     print(f"{name.stem:<14}{len(content):>7} bytes")
 
 
@@ -127,14 +115,16 @@ def page() -> str:
 
 
 def _section(motion: Motion) -> str:
+    length = motion().end
+    pace = f", here {FAST:g} times as fast" if speed_of(length) > 1.0 else ""
     lines = [
         f"## {motion.name}",
         "",
         motion.summary,
         "",
-        f"![{motion.summary.split(':')[0]}](images/gallery/{motion.name}.webp)",
+        f"![{motion.summary.split(':')[0]}](images/gallery/{motion.name}.avif)",
         "",
-        f"`go2-wbc run {motion.name}`, {motion().end:.1f} s.",
+        f"`go2-wbc run {motion.name}`, {length:.1f} s{pace}.",
     ]
     if motion.parameters:
         lines += ["", "| parameter | default | valid |", "|---|---|---|"]
@@ -157,44 +147,25 @@ def played(motion: Timeline, robot: GO2Controller) -> Recording:
     return whole.part(rows)
 
 
-def telling_rows(recording: Recording) -> list[int]:
-    """Rows, in order: the start, the pose farthest from it, the one farthest from these, ...
-
-    Farthest-point sampling (Gonzalez 1985) on the places of nose, tail, feet and a point above the
-    trunk, among the rows that are at least ``FAR`` of the way from the start.
-    """
-    robot = PosedRobot(load_robot_visuals())
-    places = ((robot.feet(q), robot.on_trunk(TRUNK_POINTS)) for q in recording.q)
-    points = np.array([np.vstack(pair).ravel() for pair in places])
-    away = np.linalg.norm(points - points[0], axis=1)
-    distance = np.where(away >= FAR * away.max(), away, -1.0)
-    chosen = [0]
-    while len(chosen) < (MOMENTS if recording.duration < LONG else 2 * MOMENTS):
-        chosen.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
-    return sorted(chosen)
-
-
-def picture(recording: Recording, rows: Sequence[int]) -> bytes:
-    """The moments, ``MOMENTS`` in a line, as one WebP of at most ``SIZE_LIMIT`` bytes.
+def loop(recording: Recording) -> bytes:
+    """The run as a looping AVIF of at most ``SIZE_LIMIT`` bytes.
 
     Raises:
-        ConfigError: if it is larger in every quality.
+        ConfigError: if it is larger.
     """
-    frame_renderer = FrameRenderer(recording, STYLE)
-    width, height = PANEL
-    lines = -(-len(rows) // MOMENTS)
-    size = (MOMENTS * (width + GAP) - GAP, lines * (height + GAP) - GAP)
-    sheet = Image.new("RGB", size, "white")
-    font = ImageFont.load_default(15)
-    for place, row in enumerate(rows):
-        time = float(recording.time[row] - recording.time[0])
-        panel = Image.fromarray(frame_renderer.shoot(time))
-        corner = (width - 12, height - 10)
-        ImageDraw.Draw(panel).text(corner, f"{time:.1f} s", INK, font, anchor="rs")
-        line, column = divmod(place, MOMENTS)
-        sheet.paste(panel, (column * (width + GAP), line * (height + GAP)))
-    return encoded_webp([sheet], 0, SIZE_LIMIT)
+    frame_renderer, stream = FrameRenderer(recording, STYLE), io.BytesIO()
+    times = frame_times(recording, speed=speed_of(recording.duration), fps=LOOP_RATE)
+    first, *rest = (Image.fromarray(frame_renderer.shoot(time)) for time in times)
+    film = {"save_all": True, "append_images": rest, "duration": round(1000 / LOOP_RATE)}
+    first.save(stream, "AVIF", quality=QUALITY, speed=EFFORT, **film)
+    if stream.tell() > SIZE_LIMIT:
+        raise ConfigError(f"the loop would have {stream.tell()} bytes, limit {SIZE_LIMIT}")
+    return stream.getvalue()
+
+
+def speed_of(length: float) -> float:
+    """How much faster than it is a motion of this length [s] is shown."""
+    return FAST if length >= LONG else 1.0
 
 
 def demo() -> Recording:

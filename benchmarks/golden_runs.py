@@ -5,8 +5,6 @@ They drive the public ``GO2Controller``. What each stage of a tick made is read 
 however what lies behind them is rewritten.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, fields

@@ -1,7 +1,5 @@
 """The high five: how high, how steady, how far from every limit; and what hits the held paw."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

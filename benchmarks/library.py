@@ -4,8 +4,6 @@ On the true state: does the robot stay up, on its feet, and on its plan? On its 
 the conditions of ``benchmarks.locomotion``: is it done, and is it true when ``play`` says so?
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -25,8 +25,6 @@ where the robot lies:
 ``benchmarks.unknown_world`` has the groups ``unknown``, ``unknown-sensors`` and ``robots``.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import partial
@@ -41,7 +39,7 @@ from benchmarks.study import IMU, Study, TrialResult
 from benchmarks.unknown_world import STUDIES as UNKNOWN
 from controller.motion_measurement import FULL
 from controller.sweeps.studies import set_off
-from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
+from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.envelopes import trot_of
@@ -184,7 +182,6 @@ EACH = 3.0  # s
 SLOPE = math.radians(15.0)
 MIXED = (-0.8, -0.5, -1.5), (1.5, 0.5, 1.5)
 """Range of what is commanded: ahead, to the left [m/s], turning [rad/s]."""
-CALLS = ("stand", "high_five", "sit", "stand_again", "stop", "lie_down")
 
 
 def _place(plant: MujocoPlant) -> Float[np.ndarray, "2 3"]:
@@ -253,30 +250,6 @@ def _pose_off(plant: MujocoPlant) -> Float[np.ndarray, "2"]:
     return np.array([seen.q[2] - true.q[2], seen.yaw - true.yaw])
 
 
-def measure_calls(trial: Trial, found: TrialResult) -> None:
-    """Stand, raise a paw, sit, stand, trot and stop, lie down: what says ``True``, upright."""
-    found.values |= dict.fromkeys(CALLS, 0.0)
-    with TrialRobot(plant_of(trial, FIRST_SEED, UNTOLD)) as robot:
-        go2 = robot.go2
-
-        def stop() -> bool:
-            robot.require(go2.walk())
-            go2.move(ODOMETRY_SPEED)
-            robot.wait(3.0)
-            go2.stop()
-            return go2.last_outcome.ok
-
-        calls = (go2.stand, go2.high_five, go2.sit, go2.stand, stop, go2.lie_down)
-        for name, call in zip(CALLS, calls, strict=True):
-            try:
-                done = call()
-                if name != "lie_down":  # the trunk is on the ground then
-                    robot.require(done)
-                found.values[name] = float(done)
-            except TrialFailed as failed:
-                found.failures[name] = str(failed)
-
-
 _stand = partial(measure_drift, seconds=60, walks=False)
 _walk = partial(measure_drift, seconds=20, walks=True)
 _CREEP = (("creep", "creep of the estimate", "<= 3 mm"), ("moved", "way in truth", "mm"))
@@ -302,7 +275,6 @@ def _barred(which: str, most: float) -> tuple[tuple[str, str, str], ...]:
 _ON_STAIRS = partial(measure_estimate, terrain=Stairs(), what="up")
 _ON_SLOPE = partial(measure_estimate, terrain=Slope(SLOPE), what="slope")
 _MIXED = partial(measure_estimate, terrain=None, what="mixed")
-_DONE = tuple((call, f"{call} done", ">= 1") for call in CALLS)
 ESTIMATED = tuple(
     Study(name, {f"sensors: {item}": rows}, measure, prefix, group="sensors", sensors=IMU)
     for name, item, rows, measure, prefix in (
@@ -311,7 +283,6 @@ ESTIMATED = tuple(
         ("stairs", "up 4 stairs of 8 cm, 9 s", _barred("height", 15), _ON_STAIRS, "stairs"),
         ("mixed", "20 commands, 60 s", _barred("turned", 1.5), _MIXED, "mixed"),
         ("slope", "to all sides on 15 deg, 12 s", _barred("velocity", 0.03), _ON_SLOPE, "slope"),
-        ("calls", "calls", _DONE, measure_calls, "done"),
     )
 )
 

@@ -7,8 +7,6 @@ legitimately zero; and computed block by block where blocks have different units
 block cannot hide a small one.
 """
 
-from __future__ import annotations
-
 from contextlib import closing
 from dataclasses import dataclass
 from itertools import product

@@ -4,8 +4,6 @@ While the demo is driven by compiled code, every kernel that is called is given 
 plain Python, tick by tick, and what both made is compared.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -5,8 +5,6 @@ Every motion of the exam is checked and played in random worlds. ``--fit`` fits 
 stores it; what is reported is of the test half, whose families no threshold and no fit has seen.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import io

@@ -1,7 +1,5 @@
 """Fits the model of ``motions.feasibility.probability`` to outcomes, and judges its calibration."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

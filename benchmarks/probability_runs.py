@@ -6,8 +6,6 @@ strata in the shares that they have of all, and families evenly. After them come
 the language, each in the world of the exam: a fit needs more than fifty structures.
 """
 
-from __future__ import annotations
-
 import json
 from collections import Counter, defaultdict
 from collections.abc import Sequence

@@ -1,11 +1,9 @@
 """``python -m benchmarks qp_infeasibility``: answers where its constraints contradict it.
 
-Blind trots over boxes, pushes that throw the robot off its stride, random commands, and legs at the
-ends of their joints. The limits of ``wbc.relaxation`` were chosen on box layouts 0 to 5 and six
-pushes; no seed of theirs is judged here.
+Blind trots over boxes, pushes that throw the robot off its stride, and legs at the ends of their
+joints; random commands are in ``balance``. The limits of ``wbc.relaxation`` were chosen on box
+layouts 0 to 5 and six pushes; no seed of theirs is judged here.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -29,8 +27,6 @@ from go2_wbc.robot.rotations import yaw_rotation
 
 FIRST_LAYOUT = 20  # Seed of the first layout of boxes that is judged
 BOX_HEIGHT = 0.08  # m
-FIRST_COMMANDS = 900
-"""Seed of the first sequence of random commands that is judged."""
 FIRST_PUSH = 700  # Seed of the first series of pushes that is judged
 IMPULSE, IMPULSE_AT_STOPS = 30.0, 20.0
 """N s of a push; and at the ends of the joints, where a trot has less room to answer."""
@@ -65,7 +61,7 @@ def pushed(
         yield 2.5
 
 
-def commanded(robot: TrialRobot, rng: np.random.Generator, count: int = 40) -> Iterator[float]:
+def commanded(robot: TrialRobot, rng: np.random.Generator, count: int) -> Iterator[float]:
     """Random velocities, ``count`` of them, a new one every 1.5 s."""
     for _ in range(count):
         linear_x, linear_y, angular_z = rng.uniform((-1.0, -0.6, -2.0), (1.5, 0.6, 2.0)).tolist()
@@ -137,12 +133,6 @@ def measure_pushes(trial: Trial, found: TrialResult) -> None:
     _measure(robot, partial(pushed, impulse=IMPULSE, speed=0.5), seed, found)
 
 
-def measure_commands(trial: Trial, found: TrialResult) -> None:
-    """Random commands on a floor and with a mass that the controller does not know."""
-    seed = FIRST_COMMANDS + trial.seed
-    _measure(TrialRobot(replace(trial, seed=seed)), commanded, seed, found)
-
-
 def measure_stops(trial: Trial, found: TrialResult) -> None:
     """Trot so high that the calves come to their stops, or (odd seeds) so low; and be pushed."""
     seed = FIRST_PUSH + trial.seed
@@ -172,7 +162,6 @@ NEAR = ("near", "ticks, a calf at its stop", "%")
 STUDIES = (
     Study("boxes", {"8 cm boxes, trot 1.0 m/s, 8 s": ROWS}, measure_boxes),
     Study("pushes", {"trot 0.5 m/s, three pushes of 30 N s": ROWS}, measure_pushes),
-    Study("commands", {"random commands, 60 s": ROWS}, measure_commands),
     Study("stops", {"calves at their stops, pushes of 20 N s": (*ROWS, NEAR)}, measure_stops),
 )
 """In the order of the report."""

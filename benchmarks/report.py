@@ -1,7 +1,5 @@
 """Means, deviations, worst seeds and verdicts, as a table of at most 80 columns and as JSON."""
 
-from __future__ import annotations
-
 import math
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
@@ -100,18 +98,18 @@ def summarise(scenarios: Sequence[Study], results: Results) -> Report:
 def summarise_metric(metric: Metric, trials: Mapping[int, TrialResult]) -> MetricResult:
     """One metric over the trials of its scenario, given by seed."""
     name = metric.name
-    ordered = {s: trial for s, trial in sorted(trials.items()) if name not in trial.not_asked}
+    ordered = dict(sorted(trials.items()))
     found = {s: trial.values[name] for s, trial in ordered.items() if name in trial.values}
     failures = {s: why for s, trial in ordered.items() if (why := trial.failure(name)) is not None}
     failures |= {s: f"{v} was measured" for s, v in found.items() if math.isnan(v)}
     values = {s: v for s, v in found.items() if not math.isnan(v)}
     missing = [s for s in ordered if s not in values]
-    worst = metric.direction.worst(values) if values else None
+    worst, numbers = metric.direction.worst(values) if values else None, list(values.values())
     return MetricResult(
         metric=metric,
         n=len(ordered),
-        mean=fmean(values.values()) if values else None,
-        sd=_deviation(list(values.values())),
+        mean=fmean(numbers) if numbers else None,
+        sd=stdev(numbers) if len(numbers) > 1 and all(map(math.isfinite, numbers)) else None,
         worst=None if missing or worst is None else values[worst],
         worst_seed=missing[0] if missing else worst,
         values=values,
@@ -167,10 +165,6 @@ def _notes(result: MetricResult) -> Iterator[str]:
         )
     if result.falls > _NOTES:
         yield f"    and {result.falls - _NOTES} more"
-
-
-def _deviation(values: Sequence[float]) -> float | None:
-    return stdev(values) if len(values) > 1 and all(map(math.isfinite, values)) else None
 
 
 def _number(value: float | None) -> str:

@@ -1,7 +1,5 @@
 """Robots on trial, what pushes them, and what is true of them by the simulator."""
 
-from __future__ import annotations
-
 import atexit
 import math
 import shutil
@@ -13,13 +11,11 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from controller.motion_measurement import FULL
 from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, Trial, TrialRobot
 from go2_wbc.legs import LEGS
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.plant.mujoco.model import JointDynamics, build_spec
-from go2_wbc.reference import Anchor
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.profile import find_profile
@@ -105,12 +101,6 @@ def heading_force(angle: float, impulse: float) -> Float[np.ndarray, "3"]:
     return impulse / PUSH_TIME * np.array([math.cos(angle), math.sin(angle), 0.0])
 
 
-def feet_frame(robot: TrialRobot) -> Anchor:
-    """The frame of the feet as they stand, in truth."""
-    model = RobotModel()
-    return Anchor.of_feet(model.snapshot(robot.plant.truth()).p_world_feet, model.foot_radius)
-
-
 def way_between(before: RobotState, after: RobotState) -> tuple[float, float, float]:
     """How far the base has come ahead and to the left [m], and how far it has turned [rad]."""
     yaw = float(before.rpy[2])
@@ -130,17 +120,6 @@ def standing_failure(robot: TrialRobot) -> str | None:
         return f"tilt {math.degrees(state.tilt):.1f} deg"
     least = float(state.foot_forces.min())
     return f"a foot carries {least:.1f} N only" if least < LOAD else None
-
-
-def loads(recorded: TruthRecording) -> dict[str, float]:
-    """Largest shares of a torque and a speed limit; share [%] of ticks of motors at their limit."""
-    model = RobotModel()
-    shares = recorded.torque_shares(model)
-    return {
-        "torque": float(shares.max()),
-        "speed": recorded.peak_speed_share(model),
-        "saturated": 100.0 * float((shares >= FULL).mean()),
-    }
 
 
 def com_height(window: TruthRecording, model: RobotModel | None = None) -> float:

@@ -152,6 +152,7 @@ def _walked(robot: TrialRobot, speed: float, length: float) -> float:
     start, course = plant.truth(), plant.read().yaw
     way, most, side = 0.0, PATIENCE + length / (LEAST_SHARE * abs(speed)), math.copysign(1.0, speed)
     ahead = side * np.array([math.cos(start.yaw), math.sin(start.yaw)])
+    way = 0.0
     while (elapsed := plant.time - start.time) <= most:
         go2.move(speed, STEER * wrap_angle(course - plant.read().yaw))
         go2.wait(LOOK)

@@ -13,8 +13,6 @@ judges, by criteria of this module. Causes were looked for on seeds below ``FIRS
 - hangs: a call, or one in the second thread, that does not end in time.
 """
 
-from __future__ import annotations
-
 import math
 import threading
 from collections.abc import Mapping, Sequence

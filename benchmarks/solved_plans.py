@@ -4,8 +4,6 @@ To be run whenever a dynamic motion of the library, the planner's limits or the 
 says so. Plans that no motion needs any more are removed.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 

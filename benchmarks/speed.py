@@ -6,8 +6,6 @@ the time that PlaCo takes on it, and are scaled to the one that measures. Wants 
 the same.
 """
 
-from __future__ import annotations
-
 import os
 import resource
 import subprocess

@@ -7,8 +7,6 @@ and a tick sets the state and the targets, and solves. PlaCo's own regularisatio
 A gain is one number for a task; where ours are three it gets their mean, which costs the same.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from statistics import fmean
 

@@ -1,7 +1,5 @@
 """What one solution costs, by us and by PlaCo, on the same states in turn."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing

@@ -4,8 +4,6 @@ A tick that is late, or ten times longer than the others, may be ours or the mac
 loop beside it, whose work allocates nothing, has as many of them, it is the machine's.
 """
 
-from __future__ import annotations
-
 import hashlib
 import time
 import tracemalloc

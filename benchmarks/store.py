@@ -4,8 +4,6 @@ The trials of a study are the rows of a sweep, in a file of its own that ``contr
 reads: a column for each metric, and in words why one has no value.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math
@@ -25,7 +23,7 @@ from go2_wbc.errors import ConfigError
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = Path("out/benchmarks")
 """Where finished trials are kept, in a folder for each benchmark."""
-_WORDS = ("failures", "notes", "not_asked")
+_WORDS = ("failures", "notes")
 """Of a trial, by row."""
 
 

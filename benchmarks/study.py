@@ -77,14 +77,12 @@ class TrialResult:
         failures: by row, why the robot did not do it although there may be a value.
         reason: why rows without a value have none; empty if all have one.
         notes: what else is worth keeping, by name; is on disk only.
-        not_asked: by row, why this trial says nothing of it, neither good nor bad.
     """
 
     values: dict[str, float] = field(default_factory=dict)
     failures: dict[str, str] = field(default_factory=dict)
     reason: str = ""
     notes: dict[str, str] = field(default_factory=dict)
-    not_asked: dict[str, str] = field(default_factory=dict)
 
     def failure(self, metric: str) -> str | None:
         """Why this trial counts as failed for ``metric``, or None."""
@@ -98,7 +96,7 @@ class TrialResult:
 
     def named(self, prefix: str) -> TrialResult:
         """The same with names that begin with ``prefix``."""
-        named = ("values", "failures", "notes", "not_asked")
+        named = ("values", "failures", "notes")
         parts = {
             part: {joined(prefix, n): v for n, v in getattr(self, part).items()} for part in named
         }

@@ -17,8 +17,6 @@ trots: an estimate of the ground that runs away takes the trunk along. An A1 and
 profile, sit down and turn besides, and get up after they were thrown over.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace

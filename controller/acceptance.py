@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from statistics import fmean
 
 from controller.behaviours.plans import PlayPlan
 from controller.checks import ground_height
-from controller.modes import Aborted, Measurements, listed
+from controller.modes import Aborted, Limited, Measurements, are_within, told
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.plant import Plant
 from go2_wbc.robot.state import Snapshot
@@ -34,9 +33,6 @@ END_PLACE = 0.05
 walk of 2 m."""
 END_HEADING = math.radians(4.0)
 """Angle [rad] by which its end may be turned."""
-
-Limited = Mapping[str, tuple[float, float | None]]
-"""What was measured, by name with unit: the value, and what it must stay below, if anything."""
 
 
 class Acceptance:
@@ -76,29 +72,25 @@ class Acceptance:
             end = arrival(*played.end_error(snapshot), played.landings)
         measured = {**at_rest, **_values(deviation), **_values(end)}
         if not are_within(end):
-            raise Aborted(f"{plan.name} ended elsewhere: {listed(measured)}", measured)
+            raise Aborted(f"{plan.name} ended elsewhere: {told(end)}", measured)
         if not are_within(deviation):
-            raise Aborted(f"{plan.name} went another way: {listed(measured)}", measured)
+            raise Aborted(f"{plan.name} went another way: {told(deviation)}", measured)
         return self.with_held_feet(measured)
 
     def with_held_feet(self, measured: Measurements) -> Measurements:
         """``measured`` and how high feet were held, if that is as planned; else ``Aborted``."""
-        found, is_low = dict(measured), False
+        found, low = dict(measured), list[str]()
         for foot, heights in zip(self._held, self._heights, strict=True):
             where = f" in {foot.name}" if len(self._held) > 1 else ""
             found[f"planned paw height{where} [m]"] = round(foot.height, 9)  # of a curve
             found[f"least paw height{where} [m]"] = min(heights)
-            found[f"mean paw height{where} [m]"] = fmean(heights)
-            is_low = is_low or fmean(heights) < foot.height - PAW_TOLERANCE
-        if is_low:
-            name = self._plan.name
-            raise Aborted(f"{name} held no paw at its height: {listed(found)}", found)
+            found[name := f"mean paw height{where} [m]"] = mean = fmean(heights)
+            if mean < (least := foot.height - PAW_TOLERANCE):
+                low.append(f"{name} {mean:.3g}, at least {least:.3g}")
+        if low:
+            reason = f"{self._plan.name} held no paw at its height: {', '.join(low)}"
+            raise Aborted(reason, found)
         return found
-
-
-def are_within(measured: Limited) -> bool:
-    """Whether every value is below its limit."""
-    return all(limit is None or value < limit for value, limit in measured.values())
 
 
 def _values(measured: Limited) -> Measurements:
@@ -110,11 +102,14 @@ def off_plan(deviation: Deviation, *, is_dynamic: bool = False) -> Limited:
     place = DYNAMIC_PLACE if is_dynamic else PLACE_DEVIATION
     attitude = DYNAMIC_ATTITUDE if is_dynamic else ATTITUDE_DEVIATION
     degrees = math.degrees
-    return {
+    found: dict[str, tuple[float, float | None]] = {
         "mean place off plan [m]": (deviation.place, place),
         "mean attitude off plan [deg]": (degrees(deviation.attitude), degrees(attitude)),
-        "mean joints off plan [deg]": (degrees(deviation.joints), degrees(JOINT_DEVIATION)),
     }
+    if deviation.joints is not None:
+        joints = degrees(deviation.joints), degrees(JOINT_DEVIATION)
+        found["mean joints off plan [deg]"] = joints
+    return found
 
 
 def arrival(place: float, heading: float, landings: Landings) -> Limited:
@@ -125,9 +120,10 @@ def arrival(place: float, heading: float, landings: Landings) -> Limited:
         heading: angle [rad] by which they are turned.
         landings: what came of its steps.
     """
+    landed = {} if landings.error is None else {"worst landing error [m]": (landings.error, None)}
     return {
         "end place error [m]": (place, END_PLACE),
         "end heading error [rad]": (heading, END_HEADING),
-        "worst landing error [m]": (landings.error, None),
+        **landed,
         "missed landings": (float(landings.missed), 1.0),
     }

@@ -9,12 +9,15 @@ from types import UnionType
 from typing import TypeVar
 
 from go2_wbc.config import Config, load_config
-from go2_wbc.errors import ConfigError, Go2WbcError
+from go2_wbc.errors import CommandError, ConfigError, Go2WbcError
+from go2_wbc.planning.command import finite_number
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.profile import GO2
 from go2_wbc.wbc.tasks import Task
 
 NAMESPACE = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
+LONGEST = 1e6
+"""Time [s] of one call: 11 days."""
 _Value = TypeVar("_Value")
 
 
@@ -53,6 +56,14 @@ def pace(realtime: bool, plant: Plant | None) -> bool:
             "GO2Controller(plant=..., realtime=True)"
         )
     return realtime
+
+
+def time(name: str, value: float) -> float:
+    """``value`` [s]; raise CommandError if it is no number from 0 to ``LONGEST``."""
+    value = finite_number(name, value)
+    if not 0.0 <= value <= LONGEST:
+        raise CommandError(f"{name} must be from 0 to {LONGEST:g} s, got {value}")
+    return value
 
 
 def namespace(value: str) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
+from controller.modes import Limited, are_within
+from go2_wbc.geometry import support_margin
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.state import Snapshot
 
@@ -23,6 +25,12 @@ LYING_HEIGHT = 0.13
 """Height [m] of the base above the lowest foot below which the robot is down."""
 SETTLED = 0.01
 """Height [m] of the base above where it goes limp below which the belly is down."""
+LYING_TILT = 0.5
+"""Angle [rad] from the vertical below which a robot lies on its belly."""
+LEANING = 0.4
+"""Tilt [rad] beyond which a robot sits, or tips over, and does not stand: twice a steep slope's."""
+MOVING_SPEED = 0.3
+"""Speed [m/s] of the base beyond which a robot moves: one that stood sinks as fast after 0.1 s."""
 FOLD_TOLERANCE = 0.5
 """Angle [rad] from the tucked legs' joints that still counts as folded."""
 
@@ -59,43 +67,70 @@ def _over_feet(snapshot: Snapshot, p_world: Float[np.ndarray, "3"]) -> float:
     return float(snapshot.foot_radius) - float(below[0])
 
 
-def is_still(snapshot: Snapshot) -> bool:
-    """Whether base and joints are at rest."""
+def calm(snapshot: Snapshot) -> Limited:
+    """What is asked of a robot that has walked and rests: of its CoM."""
+    return {"CoM speed [m/s]": (float(np.linalg.norm(snapshot.v_world_com)), CALM_SPEED)}
+
+
+def _still(snapshot: Snapshot) -> Limited:
+    """What is asked of a robot at rest: of base and joints."""
     v = snapshot.state.v
-    return bool(np.abs(v[:3]).max() < STILL_SPEED and np.abs(v[6:]).max() < STILL_JOINTS)
+    return {
+        "base speed along an axis [m/s]": (float(np.abs(v[:3]).max()), STILL_SPEED),
+        "joint speed [rad/s]": (float(np.abs(v[6:]).max()), STILL_JOINTS),
+    }
 
 
-def is_calm(snapshot: Snapshot) -> bool:
-    """Whether the CoM of a robot that has walked is at rest."""
-    return bool(np.linalg.norm(snapshot.v_world_com) < CALM_SPEED)
-
-
-def _is_on_its_feet(snapshot: Snapshot, height_error: float, pitch: float) -> bool:
+def _on_its_feet(snapshot: Snapshot, height_error: float, pitch: float) -> Limited:
     roll, measured_pitch, _ = snapshot.state.rpy
-    return bool(
-        snapshot.state.feet_in_contact.all()
-        and abs(height_error) < HEIGHT_TOLERANCE
-        and max(abs(roll), abs(measured_pitch - pitch)) < ANGLE_TOLERANCE
-        and is_still(snapshot)
-    )
+    angle = np.degrees(max(abs(roll), abs(measured_pitch - pitch)))
+    return {
+        "height error [m]": (abs(height_error), HEIGHT_TOLERANCE),
+        "attitude error [deg]": (float(angle), np.degrees(ANGLE_TOLERANCE)),
+        "feet in the air": (float((~snapshot.state.feet_in_contact).sum()), 1.0),
+        **_still(snapshot),
+    }
+
+
+def standing(snapshot: Snapshot) -> Limited:
+    """What is asked of a robot that stands: still, on four feet, level, at its height."""
+    return _on_its_feet(snapshot, com_height(snapshot) - snapshot.profile.stand_height, 0.0)
+
+
+def sitting(snapshot: Snapshot) -> Limited:
+    """What is asked of a robot that sits: still, rump down, trunk up, four feet on the ground."""
+    height, pitch = snapshot.profile.sit
+    over = _over_feet(snapshot, snapshot.state.p_world_base)
+    return _on_its_feet(snapshot, over - height, pitch)
+
+
+def lying(snapshot: Snapshot) -> Limited:
+    """What is asked of a robot that lies: still, on its belly."""
+    return {
+        "base height [m]": (base_height(snapshot), snapshot.profile.lie_height + SETTLED),
+        "tilt [deg]": (float(np.degrees(snapshot.state.tilt)), np.degrees(LYING_TILT)),
+        **_still(snapshot),
+    }
 
 
 def is_standing(snapshot: Snapshot) -> bool:
     """Whether the robot stands still on four feet, level, at the standing height."""
-    return _is_on_its_feet(snapshot, com_height(snapshot) - snapshot.profile.stand_height, 0.0)
+    return are_within(standing(snapshot))
 
 
-def is_sitting(snapshot: Snapshot) -> bool:
-    """Whether the robot sits still: rump down, trunk up, four feet on the ground."""
-    height, pitch = snapshot.profile.sit
-    over = _over_feet(snapshot, snapshot.state.p_world_base)
-    return _is_on_its_feet(snapshot, over - height, pitch)
-
-
-def is_lying(snapshot: Snapshot) -> bool:
-    """Whether the robot lies still on its belly."""
-    is_down = base_height(snapshot) < snapshot.profile.lie_height + SETTLED
-    return bool(is_down and snapshot.state.tilt < 0.5 and is_still(snapshot))
+def why_not_standing(snapshot: Snapshot) -> str:
+    """Why a robot that nobody balances does not stand on its feet; empty if it does."""
+    state, feet, p_com = snapshot.state, snapshot.p_world_feet[:, :2], snapshot.p_world_com[:2]
+    height, speed = base_height(snapshot), float(np.linalg.norm(state.v[:3]))
+    if height < LYING_HEIGHT:
+        return f"it lies, its base {height:.2f} m above its feet"
+    if state.tilt > LEANING:
+        return f"its trunk is tilted by {np.degrees(state.tilt):.0f} deg"
+    if raised := [leg.name for leg in LEGS if not state.feet_in_contact[leg]]:
+        return f"{' and '.join(raised)} in the air"
+    if speed > MOVING_SPEED:
+        return f"it moves at {speed:.2f} m/s"
+    return "" if support_margin(feet, p_com) > 0.0 else "its CoM is not above its feet"
 
 
 def posture_measurements(snapshot: Snapshot) -> dict[str, float]:

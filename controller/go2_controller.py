@@ -6,7 +6,7 @@ import logging
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import NoReturn
@@ -16,7 +16,9 @@ from controller import arguments
 from controller.assembly import build_pilot
 from controller.modes import Aborted, Measurements, Mode, Outcome
 from controller.navigation import DriveStraight, TurnInPlace
+from controller.pacing import REASON, LogOnce
 from controller.telemetry import Telemetry
+from go2_wbc.arguments import typed
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ClosedError, CommandError, Go2WbcError, ModeError, TimelineError
@@ -47,7 +49,8 @@ class GO2Controller:
     background thread at wall-clock pace.
 
     A blocking call returns True only when the measured state shows that the thing was done;
-    otherwise False, with the reason in ``last_outcome``.
+    otherwise False, with the reason in ``last_outcome``. It raises ModeError after a fall or while
+    another one runs, and all raise ClosedError once the robot is closed.
 
     Example:
         >>> with GO2Controller() as go2:
@@ -55,6 +58,7 @@ class GO2Controller:
         True
     """
 
+    @typed("after_tick")
     def __init__(
         self,
         namespace: str = "robot1",
@@ -68,7 +72,7 @@ class GO2Controller:
         after_tick: Callable[[], None] = lambda: None,
         extra_tasks: Sequence[Task] = (),
     ) -> None:
-        """Take over a robot that lies on the ground, damped.
+        """Begin with a robot that lies on the ground, damped; one that stands: ``take_over``.
 
         Args:
             namespace: name of this robot: letters, digits and underscores, a letter first.
@@ -76,20 +80,15 @@ class GO2Controller:
             realtime: let the robot live at wall-clock pace in a background thread.
             viewer: open MuJoCo's viewer if there is a display.
             config: numbers of the engine, or a TOML file that overrides some.
-            robot: name of its profile: "go2", "a1" or "go1"; by default that of the plant or the
-                configuration.
-            urdf: another URDF of the robot instead of the installed one: what the controller takes
-                the robot for. Without ``plant`` the simulated robot is built from it, too.
+            robot: "go2", "a1" or "go1"; by default that of the plant or the configuration.
+            urdf: of the robot that is driven, and without ``plant`` also of the simulated one.
             after_tick: is called after every control period, in the thread that ticks.
-            extra_tasks: tasks of your own in the whole-body QP, beside the built-in ones, whenever
-                it balances the robot. They are asked in the thread that ticks.
+            extra_tasks: of your own in the whole-body QP; they are asked in the thread that ticks.
 
         Raises:
-            ConfigError: for a namespace, configuration or task that is not valid, or without
-                ``realtime`` for a plant that needs it.
+            ConfigError: for a value that is not valid, or a plant that needs ``realtime``.
             SolverUnavailable: if the configured QP solver is unknown or not installed.
-            DescriptionError: if the robot's files are missing, broken, or not such a
-                robot's.
+            DescriptionError: if the robot's files are missing, broken, or another robot's.
             PlantError: if the plant does not answer.
         """
         self._namespace = arguments.namespace(namespace)
@@ -103,10 +102,7 @@ class GO2Controller:
         with ExitStack() as opened:
             if plant is None:
                 plant = MujocoPlant(
-                    urdf=description.urdf_path,
-                    robot=config.robot,
-                    visuals=viewer,
-                    motor=config.motor,
+                    urdf=urdf, robot=config.robot, visuals=viewer, motor=config.motor
                 )
                 opened.callback(plant.close)
             self._plant = plant
@@ -123,7 +119,7 @@ class GO2Controller:
             self._resources = opened.pop_all()
         self._runner, self._description = self._pilot.runner, description
         self._motor, self._limits = config.motor, config.feasibility
-        self._closed = False
+        self._closed, self._clipped = False, LogOnce(_log)
         self._turn: dict[str, _Call] = {}  # what runs: one entry, or none
         self._last = Outcome(True, "lying, nothing asked yet", 0.0)
         self._planning = threading.Lock()
@@ -145,6 +141,10 @@ class GO2Controller:
     def recover(self) -> bool:
         """Get up and stand after a fall."""
         return self._call("recover", self._pilot.recover, allow_fallen=True)
+
+    def take_over(self) -> bool:
+        """Balance a robot that stands already, from how it stands. False if it does not stand."""
+        return self._call("take_over", self._pilot.take_over)
 
     def damp(self) -> None:
         """Go limp at once, safely; also ends a call that is running in another thread."""
@@ -195,10 +195,8 @@ class GO2Controller:
         """
         self._check_open()
         wanted = VelocityCommand(linear_x, linear_y, angular_z)
-        pose, limits = BodyPose(height, roll, pitch, yaw), self._pilot.limits
-        followed = self._pilot.set_command(wanted, pose)
-        if followed != wanted:
-            _log.warning("velocity command clipped from %s to %s: %s", wanted, followed, limits)
+        self._pilot.set_command(wanted, BodyPose(height, roll, pitch, yaw))
+        self._clipped.warn(*self._pilot.excess(wanted))
 
     def stop(self) -> None:
         """Zero velocity: the robot comes to rest in walking mode.
@@ -217,12 +215,18 @@ class GO2Controller:
         """Turn left in place by ``angle`` [rad], measured on the heading; negative turns right.
 
         Ends at rest in walking mode.
+
+        Raises:
+            CommandError: for what is no finite number, or looks like degrees.
         """
-        angle = finite_number("angle", angle)
         return self._call("turn_left", lambda: self._pilot.run_goal(TurnInPlace(angle)))
 
     def turn_right(self, angle: float) -> bool:
-        """Turn right in place by ``angle`` [rad], measured on the heading."""
+        """Turn right in place by ``angle`` [rad], measured on the heading.
+
+        Raises:
+            CommandError: as ``turn_left``.
+        """
         angle = finite_number("angle", angle)
         return self._call("turn_right", lambda: self._pilot.run_goal(TurnInPlace(-angle)))
 
@@ -230,22 +234,23 @@ class GO2Controller:
         """Walk ``distance`` [m] straight ahead, measured; negative is backward.
 
         Ends at rest in walking mode.
+
+        Raises:
+            CommandError: for what is no finite number.
         """
-        distance = finite_number("distance", distance)
         return self._call("move_forward", lambda: self._pilot.run_goal(DriveStraight(distance)))
 
     # --- motions --------------------------------------------------------------------------
 
+    @typed("plan", error=CommandError)
     def high_five(
         self, side: str = "right", hold: float = 2.0, *, plan: motions.CompiledPlan | None = None
     ) -> bool:
         """Raise a front paw on three legs, hold it, tap, and come back to standing.
 
         Args:
-            side: "right" or "left".
             hold: time [s] for which the paw is held up, 0.5 to 30.
-            plan: what ``load_motion("high_five", side=side, hold=hold)`` was compiled to before;
-                by default it is compiled now.
+            plan: what this motion was compiled to before; by default it is compiled now.
 
         Raises:
             CommandError: for another side or time.
@@ -260,6 +265,7 @@ class GO2Controller:
                 plan = motions.compile_timeline(timeline, self._checker.model)
         return self._call("high_five", lambda: self._pilot.play(plan, stands_up=True))
 
+    @typed("times", "check", "allow_dynamic", error=CommandError)
     def play(
         self,
         motion: motions.Playable,
@@ -276,12 +282,10 @@ class GO2Controller:
             motion: a ``Playable``.
             times: how often, one after the other; what is measured is of the last one.
             check: with False also one that the robot cannot do is played, to see what happens.
-            allow_dynamic: let also a robot that may be a real one (``Plant.is_hardware``) play
-                motions with flight or on fewer than three feet. Simulated ones always do.
+            allow_dynamic: on hardware, too, motions with flight or on fewer than three feet.
 
         Raises:
-            CommandError: for an unknown name; lists the valid ones. Also for what is no motion, or
-                a number of times that is no whole number of 1 or more.
+            CommandError: for an unknown name, what is no motion, or ``times`` below 1.
             TimelineError: for an empty timeline.
             MotionFileError: for a file that cannot be used.
             DynamicMotionRefused: for a dynamic motion on hardware without ``allow_dynamic``.
@@ -296,13 +300,12 @@ class GO2Controller:
             departed = self._checker.departure(plan)
 
         def play() -> Measurements:
-            measured: Measurements = {}
-            for _ in range(times):
-                measured = self._pilot.play(plan, allow_dynamic=allow_dynamic)
-            return {**measured, **departed}
+            runs = [self._pilot.play(plan, allow_dynamic=allow_dynamic) for _ in range(times)]
+            return {**runs[-1], **departed}
 
         return self._call("play", play)
 
+    @typed("check", error=CommandError)
     def prepare(self, motion: motions.Playable, *, check: bool = True) -> MotionPlan:
         """What ``play`` plays: compiled, and checked, for this robot. Any thread may call it.
 
@@ -338,14 +341,14 @@ class GO2Controller:
         return motions.FeasibilityChecker(model, self._limits)
 
     def wait(self, seconds: float) -> None:
-        """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""
-        self._check_open()
-        seconds = finite_number("seconds", seconds)
-        if seconds < 0.0:
-            raise CommandError(f"seconds must not be negative, got {seconds}")
-        self._call("wait", lambda: self._pilot.wait(seconds), allow_fallen=True)
+        """Let ``seconds`` of robot time pass; the robot goes on doing what it does.
 
-    # --- looking --------------------------------------------------------------------------
+        Raises:
+            CommandError: for what is no finite number of 0 or more.
+        """
+        self._check_open()
+        seconds = arguments.time("seconds", seconds)
+        self._call("wait", lambda: self._pilot.wait(seconds), allow_fallen=True)
 
     @property
     def state(self) -> RobotState:
@@ -390,7 +393,7 @@ class GO2Controller:
     def recording(self, rate: float = 100.0) -> Recording:
         """The run so far (its last minutes), at about ``rate`` samples a second."""
         samples = self._runner.between_ticks(lambda: self.telemetry.samples(rate))
-        return samples.recording()
+        return replace(samples.recording(), model_file=self.plant.model_file)
 
     # --- ending ---------------------------------------------------------------------------
 
@@ -429,16 +432,7 @@ class GO2Controller:
     ) -> bool:
         """Run ``procedure`` to its end, one at a time in all threads; returns whether it was done.
 
-        Whatever ends it is noted. An error that is not of this project, Ctrl-C included, leaves the
-        robot limp.
-
-        Args:
-            name: of the call.
-            procedure: measures what it has done, or raises ``Aborted``.
-            allow_fallen: whether a robot that has fallen may be asked.
-
-        Raises:
-            ModeError: while another call runs, or for a robot that has fallen.
+        Its end is noted. An error that is not of this project, or Ctrl-C, leaves the robot limp.
         """
         self._check_open()
         if self._pilot.mode is Mode.FALLEN and not allow_fallen:
@@ -459,7 +453,7 @@ class GO2Controller:
                 self._pilot.collapse(reason)
                 reason = f"{reason}, damped"
             finally:
-                self._note(call, reason)
+                self._note(call, Outcome(False, reason))
             raise
         finally:  # no function is called in here: Python looks for Ctrl-C when one returns
             if "call" in self._turn and self._turn["call"] is call:
@@ -471,28 +465,27 @@ class GO2Controller:
             self._pilot.begin()
             measured = procedure()
         except Aborted as aborted:
-            self._note(call, str(aborted), aborted.measured)
+            self._note(call, Outcome(False, str(aborted), measured=aborted.measured))
             return False
         except Go2WbcError as error:
-            self._note(call, str(error))
+            self._note(call, Outcome(False, str(error)), is_raised=True)
             raise
-        self._note(call, "done", measured, ok=True)
+        self._note(call, Outcome(True, "done", measured=dict(measured)))
         return True
 
-    def _note(
-        self, call: _Call, reason: str, measured: Measurements | None = None, *, ok: bool = False
-    ) -> None:
+    def _note(self, call: _Call, outcome: Outcome, *, is_raised: bool = False) -> None:
         """What came of ``call``, and which parts are broken that the reason does not name."""
+        ok, reason = outcome.ok, outcome.reason
         if untold := [str(f) for f in self.health.faults if str(f) not in reason]:
             reason = "; ".join([reason, *untold])
         duration = self._runner.loop.state.time - call.start
-        self._last = Outcome(ok, reason, duration, dict(measured or {}))
+        self._last = replace(outcome, reason=reason, duration=duration)
         fault = self._runner.loop.fault
-        is_known = fault is not None and fault.reason in reason  # the loop has logged it
-        if ok:
+        is_known = is_raised or (fault is not None and fault.reason in reason)  # logged by the loop
+        if ok or is_known:
             _log.info("%s() after %.2f s: %s", call.name, duration, reason)
-        elif not is_known:
-            _log.warning("%s", reason)
+        else:
+            _log.warning(REASON, reason)
 
     def _check_open(self) -> None:
         if self._closed:

@@ -176,13 +176,12 @@ class JobServer(Generic[Robot]):
     def _serve(self) -> None:
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._end or self._has_work())
+                self._changed.wait_for(
+                    lambda: self._end or (self.job is not None and self.job._is_prepared)
+                )
                 if self._end:
                     return
             self.work()
-
-    def _has_work(self) -> bool:
-        return self.job is not None and self.job._is_prepared
 
     def work(self) -> bool:
         """Carry out the job whose turn it is, if it is prepared; returns whether there was one."""

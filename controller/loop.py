@@ -21,11 +21,12 @@ import numpy as np
 
 from controller.behaviours import Behaviour
 from controller.behaviours.joints import DAMPING, Damped
+from controller.pacing import REASON
 from controller.telemetry import Telemetry
 from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible
 from go2_wbc.plant.base import Plant
-from go2_wbc.reference import JointReference, Reference, Target, feet_astray, sag_and_lean
-from go2_wbc.robot.foot_watch import ASTRAY, FootWatch
+from go2_wbc.reference import JointReference, Reference, Target, hold_feet, sag_and_lean
+from go2_wbc.robot.foot_watch import PULLED, FootWatch
 from go2_wbc.robot.latency import LAGS, Latency
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor_watch import MotorWatch
@@ -105,7 +106,8 @@ class ControlLoop:
         self.latency = Latency(plant.control_period)
         self._ahead = self.state
         self._payloads = payloads
-        self._motors, self._feet, self._astray = MotorWatch(model.motor), FootWatch(), np.zeros(4)
+        self._motors, self._held = MotorWatch(model.motor), np.zeros(4)
+        self._feet = FootWatch(model.mass * model.gravity)
         self.health = Health()
         self._commands = deque([JointCommand.damping(DAMPING)], LAGS)
         self._unanswered = 0
@@ -139,7 +141,7 @@ class ControlLoop:
         self.fault = fault
         self.behaviour = Damped("fallen" if fault.is_fall else "damped")
         self.behaviour.start(self.snapshot)
-        self.warn("%s", fault.reason)
+        self.warn(REASON, fault.reason)
 
     def go_limp(self) -> None:
         """Send the safe command once, even to a plant that fails."""
@@ -199,7 +201,7 @@ class ControlLoop:
         faults = (*self.plant.sensor_faults, *self._motors.faults, *self._feet.faults)
         if len(faults) != len(self.health.faults):
             for fault in (fault for fault in faults if fault not in self.health.faults):
-                self.warn("%s", fault)
+                self.warn(REASON, fault)
             self.health = Health(faults)
         if faults and self.fault is None and self.behaviour.needs_balance:
             grave = [str(fault) for fault in faults if not fault.is_survived]
@@ -214,10 +216,8 @@ class ControlLoop:
     def _watch_feet(self, target: Reference | JointReference) -> None:
         if not (isinstance(target, Reference) and self.plant.motors_obey):
             return
-        if feet_astray(Target.of(target.row), self.snapshot, self._astray) > ASTRAY:
-            state = self.state
-            asked = self._acted.asked(state.joint_positions, state.joint_velocities)
-            self._feet.update(self._astray, asked, state, self.plant.control_period)
+        if hold_feet(Target.of(target.row), self.snapshot, self.state.tau, self._held) > PULLED:
+            self._feet.update(self._held, self.state, self.plant.control_period)
 
     def _payload_of(self, behaviour: Behaviour) -> Payload:
         """What ``behaviour`` is to know of what the robot carries."""

@@ -29,6 +29,8 @@ class Mode(Enum):
 
 Measurements = Mapping[str, float]
 """Measured quantities by name with unit."""
+Limited = Mapping[str, tuple[float, float | None]]
+"""What was measured, by name with unit: the value, and what it must stay below, if anything."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +68,26 @@ class Aborted(Exception):
     def __init__(self, reason: str, measured: Measurements | None = None) -> None:
         super().__init__(reason)
         self.measured = dict(measured or {})
+
+
+def are_within(measured: Limited) -> bool:
+    """Whether every value is below its limit."""
+    return not _beyond(measured)
+
+
+def told(measured: Limited) -> str:
+    """What of it is not below its limit, each with the limit, in one line."""
+    return ", ".join(
+        f"{name} {value:.3g}, limit {limit:.3g}" for name, value, limit in _beyond(measured)
+    )
+
+
+def _beyond(measured: Limited) -> list[tuple[str, float, float]]:
+    return [
+        (name, value, limit)
+        for name, (value, limit) in measured.items()
+        if limit is not None and not value < limit
+    ]
 
 
 def listed(measured: Measurements) -> str:

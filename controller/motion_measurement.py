@@ -23,6 +23,9 @@ FULL = 0.999
 SETTLED_CONTACT = 0.1
 """Time [s] after a touchdown, and before a lift-off, in which an unloaded foot may skid."""
 
+OF_FEET = ("feet_off", "paw_off", "landed_off")
+"""What is measured of feet that were raised or came down: 0 to the last bit if there were none."""
+
 
 @dataclass(frozen=True, slots=True)
 class MotionMeasurement:
@@ -84,8 +87,9 @@ class MotionMeasurement:
         ]
 
     def as_dict(self) -> dict[str, float | bool | str | None]:
-        """Plain values, for JSON."""
-        return {"ok": self.ok, **asdict(self)}
+        """Plain values, for JSON; None where no foot was raised or came down to be compared."""
+        feet = {name: getattr(self, name) or None for name in OF_FEET}
+        return {"ok": self.ok, **asdict(self), **feet}
 
 
 def measure_motion(

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 
+from controller.modes import Limited
 from go2_wbc.errors import CommandError
-from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.planning.command import VelocityCommand, finite_number
 from go2_wbc.robot.rotations import wrap_angle
 from go2_wbc.robot.state import RobotState
 
@@ -73,8 +74,8 @@ class Goal(ABC):
         """Whether the goal is reached and the robot may stop."""
 
     @abstractmethod
-    def is_within_tolerance(self, state: RobotState) -> bool:
-        """Whether the resting robot is at the goal."""
+    def errors(self, state: RobotState) -> Limited:
+        """How far the resting robot is from the goal, and may be."""
 
     @abstractmethod
     def measurements(self, state: RobotState) -> dict[str, float]:
@@ -86,7 +87,7 @@ class TurnInPlace(Goal):
 
     def __init__(self, angle: float) -> None:
         """Turn by ``angle`` [rad], negative turns right; CommandError beyond ``GREATEST_TURN``."""
-        if abs(angle) > GREATEST_TURN:
+        if abs(finite_number("angle", angle)) > GREATEST_TURN:
             raise CommandError(
                 f"angle of {angle:g} rad looks like degrees: write deg({angle:g}), from motions "
                 f"import deg; a turn goes to 360 deg at most, and this is {math.degrees(angle):.0f}"
@@ -102,9 +103,9 @@ class TurnInPlace(Goal):
         remaining = self._asked - self._turned(state)
         return abs(remaining) < math.radians(0.3) and abs(float(state.v[5])) < 0.15
 
-    def is_within_tolerance(self, state: RobotState) -> bool:
-        """Whether the heading is right to 1.5 deg."""
-        return abs(self._asked - self._turned(state)) < HEADING_TOLERANCE
+    def errors(self, state: RobotState) -> Limited:
+        """Of the heading."""
+        return _heading_error(self._asked - self._turned(state))
 
     def measurements(self, state: RobotState) -> dict[str, float]:
         """Angle asked and turned."""
@@ -117,7 +118,7 @@ class DriveStraight(Goal):
 
     def __init__(self, distance: float) -> None:
         """Walk ``distance`` [m], negative goes back; CommandError beyond ``GREATEST_DISTANCE``."""
-        if abs(distance) > GREATEST_DISTANCE:
+        if abs(finite_number("distance", distance)) > GREATEST_DISTANCE:
             limit = f"+-{GREATEST_DISTANCE:.0f} m"
             raise CommandError(f"distance must be within {limit}, got {distance}")
         super().__init__(f"walk {distance:.3f} m", distance, WALK_SPEED)
@@ -131,11 +132,12 @@ class DriveStraight(Goal):
         ahead, _ = self._displacement(state)
         return abs(self._asked - ahead) < 0.004 and abs(float(state.v[0])) < 0.06
 
-    def is_within_tolerance(self, state: RobotState) -> bool:
-        """Whether the robot is within 20 mm of the goal and 1.5 deg of the heading."""
+    def errors(self, state: RobotState) -> Limited:
+        """Of the place, and of the heading of the start."""
         ahead, left = self._displacement(state)
         miss = math.hypot(self._asked - ahead, left)
-        return miss < DISTANCE_TOLERANCE and abs(self._turned(state)) < HEADING_TOLERANCE
+        place = {"distance from the goal [m]": (miss, DISTANCE_TOLERANCE)}
+        return {**place, **_heading_error(self._turned(state))}
 
     def measurements(self, state: RobotState) -> dict[str, float]:
         """Distance asked and walked, and the heading error."""
@@ -146,6 +148,10 @@ class DriveStraight(Goal):
             "aside [m]": left,
             "heading error [deg]": math.degrees(self._turned(state)),
         }
+
+
+def _heading_error(angle: float) -> Limited:
+    return {"off the heading [deg]": (math.degrees(abs(angle)), math.degrees(HEADING_TOLERANCE))}
 
 
 def _clipped(value: float, limit: float) -> float:

@@ -12,6 +12,8 @@ SWITCH_INTERVAL = 0.0005
 instead of Python's two and a half, so that other work does not hold up the control loop."""
 NAP = 0.001
 """Longest sleep [s] between two calls of ``meanwhile``."""
+REASON = "%s"
+"""Format of the log line that says why something ended; ``go2-wbc`` prints outcomes itself."""
 LOG_PERIOD = 5.0
 """Least time [s] between two warnings of one kind."""
 
@@ -57,6 +59,21 @@ class Pacer:
             if meanwhile is not None and left > NAP:
                 meanwhile()
         return lag if is_given_up else 0.0
+
+
+@final
+class LogOnce:
+    """Writes a warning when what it is about begins, and not again until that has ended."""
+
+    def __init__(self, log: logging.Logger) -> None:
+        """Write to ``log``."""
+        self._log, self._level = log, 0
+
+    def warn(self, level: int, message: str) -> None:
+        """Write ``message`` if this is worse than it was; 0 is the end of it."""
+        if level > self._level:
+            self._log.warning(message)
+        self._level = level
 
 
 @final

@@ -17,11 +17,13 @@ from controller.behaviours.standing import Standing
 from controller.checks import (
     LYING_HEIGHT,
     base_height,
-    is_lying,
-    is_sitting,
     is_standing,
+    lying,
+    sitting,
+    standing,
+    why_not_standing,
 )
-from controller.modes import Aborted, Measurements, Mode, listed
+from controller.modes import Aborted, Measurements, Mode, listed, told
 from controller.navigation import Goal
 from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
@@ -39,6 +41,8 @@ READY_TIME = 0.2
 """Time [s] that a robot is given to stand ready in walking mode."""
 HOLD_TIME = 0.4
 """Time [s] in which a robot that stands takes the exact posture."""
+LOOK_TIME = 0.03
+"""Time [s] for which a limp robot's feet are looked at: one that stands sinks by 3 mm."""
 
 
 class Pilot:
@@ -77,10 +81,9 @@ class Pilot:
         """The velocity command that is being followed."""
         return self._walker.command if self.mode is Mode.WALKING else ZERO_COMMAND
 
-    @property
-    def limits(self) -> str:
-        """The envelope to which velocity commands are clipped, in plain words."""
-        return self._walker.limits
+    def excess(self, command: VelocityCommand) -> tuple[int, str]:
+        """How far ``command`` is beyond what is followed (0 if not, 2 by far), and in words."""
+        return self._walker.excess(command)
 
     @property
     def body_pose(self) -> BodyPose:
@@ -106,7 +109,19 @@ class Pilot:
             self._mode = Mode.MOVING
             tuck(self._runner)
         entry = {Mode.SITTING: Posture.SIT, Mode.LYING: Posture.LIE}.get(mode, Posture.STAND)
-        duration = HOLD_TIME if mode in (Mode.STANDING, Mode.WALKING) else 1.2
+        return self._rise(entry, HOLD_TIME if mode in (Mode.STANDING, Mode.WALKING) else 1.2)
+
+    def take_over(self) -> Measurements:
+        """Stand on the feet where they are; a robot that does not stand stays limp."""
+        if self.mode.is_upright:
+            return self.stand()
+        loop = self._loop
+        self._runner.advance_until(lambda: bool(loop.state.feet_in_contact.all()), LOOK_TIME)
+        if why_not := self._runner.between_ticks(lambda: why_not_standing(loop.snapshot)):
+            raise Aborted(f"the robot does not stand: {why_not}", self._runner.measurements())
+        return self._rise(Posture.STAND, 1.2)
+
+    def _rise(self, entry: Posture, duration: float) -> Measurements:
         self._take_posture(self._make_standing(entry, duration))
         if self._runner.settles(is_standing):
             return self._arrive(Posture.STAND)
@@ -148,12 +163,13 @@ class Pilot:
     def _make_standing(self, entry: Posture, duration: float) -> Standing:
         own = self._loop.model.profile
         make_plan = partial(rise, entry=entry, duration=duration, profile=own)
-        friction = self._walker.walking.friction
+        walking = self._walker.walking
+        friction = walking.friction if walking.has_slid else None
         return Standing(make_plan, self._loop.model, self._config.locomotion, friction)
 
     def _settle(self, posture: Posture, what: str) -> Measurements:
-        _, check = _RESTING[posture]
-        self._runner.settle(what, check)
+        _, asked = _RESTING[posture]
+        self._runner.settle(what, asked)
         return self._arrive(posture)
 
     def _arrive(self, posture: Posture) -> Measurements:
@@ -242,8 +258,8 @@ class Pilot:
         measured = goal.measurements(loop.state)
         if was_halted:
             raise Aborted(f"{goal.name} ended by stop()", measured)
-        if not goal.is_within_tolerance(loop.state):
-            raise Aborted(f"{goal.name} missed: {listed(measured)}", measured)
+        if why := told(goal.errors(loop.state)):
+            raise Aborted(f"{goal.name} missed: {why}; {listed(measured)}", measured)
         return measured
 
     def halt(self) -> bool:
@@ -348,11 +364,11 @@ class Pilot:
 
 
 _RESTING = {
-    Posture.LIE: (Mode.LYING, is_lying),
-    Posture.SIT: (Mode.SITTING, is_sitting),
-    Posture.STAND: (Mode.STANDING, is_standing),
+    Posture.LIE: (Mode.LYING, lying),
+    Posture.SIT: (Mode.SITTING, sitting),
+    Posture.STAND: (Mode.STANDING, standing),
 }
-"""The mode of a robot that rests in a posture, and whether it does."""
+"""The mode of a robot that rests in a posture, and what is asked of it then."""
 
 
 def _refuse_dynamic_on_hardware(plan: MotionPlan, plant: Plant) -> None:

@@ -22,6 +22,8 @@ from motions.feasibility import Series
 from motions.plan.trajectory import as_written
 from viz.content import CENTRE_OF_MASS, Annotation, MarginCurve, ReplayContent, Slider, Verdict
 
+AFTERWARDS = "afterwards"
+"""Label of what is shown of a run after its motion."""
 _AFTERWARDS = 1.0
 """How long [s] a run is shown after the end of its motion."""
 _TOGETHER = 0.05
@@ -51,7 +53,7 @@ def performed(checked: CheckedMotion, run: Recording, model: RobotModel) -> Repl
     """
     own = _in_motion_frame(_part(run, checked.plan.name), model)
     plan = checked.recording()
-    labels = (*plan.labels, "afterwards")
+    labels = (*plan.labels, AFTERWARDS)
     own = replace(own, labels=tuple(labels[row] for row in np.searchsorted(plan.time, own.time)))
     verdict, written = verdict_of(checked.report), _as_written(checked)
     return _shown(checked.plan, ReplayContent(own, verdict=verdict, ghost=plan, written=written))

@@ -17,10 +17,10 @@ from weakref import WeakValueDictionary
 
 from controller.behaviours import Behaviour
 from controller.behaviours.standing import Standing
-from controller.checks import is_standing, posture_measurements
+from controller.checks import posture_measurements, standing
 from controller.errands import NOT_YET, BackgroundLog, Errands, LoopEnded, LoopHangs, Pending
 from controller.loop import ControlLoop, Fault
-from controller.modes import Aborted, Measurements, listed
+from controller.modes import Aborted, Limited, Measurements, are_within, listed, told
 from controller.pacing import Pacer
 from go2_wbc.errors import ClosedError, ModeError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant
@@ -248,10 +248,11 @@ class Runner:
         self.engage(behaviour)
         self.until(lambda: behaviour.is_finished(self.loop.snapshot), limit, behaviour.label)
 
-    def settle(self, what: str, check: Callable[[Snapshot], bool]) -> None:
-        """Let time pass until ``check`` has held for a while."""
-        if not self.settles(check):
-            raise self._late(what, SETTLE_LIMIT)
+    def settle(self, what: str, asked: Callable[[Snapshot], Limited]) -> None:
+        """Let time pass until what is ``asked`` has been within its limits for a while."""
+        if not self.settles(lambda now: are_within(asked(now))):
+            why = told(asked(self.loop.snapshot)) or f"not for {CALM_TIME:g} s without a break"
+            raise self._aborted(f"{what} not done within {SETTLE_LIMIT:.1f} s: {why}")
 
     def settles(self, check: Callable[[Snapshot], bool]) -> bool:
         """Let time pass until ``check`` has held for a while; whether it came to that."""
@@ -291,8 +292,8 @@ class Runner:
         return False
 
     def _late(self, what: str, limit: float, why_not: str = "") -> Aborted:
-        told = ", ".join(part for part in (why_not, listed(self.measurements())) if part)
-        return self._aborted(f"{what} not done within {limit:.1f} s: {told}")
+        parts = ", ".join(part for part in (why_not, listed(self.measurements())) if part)
+        return self._aborted(f"{what} not done within {limit:.1f} s: {parts}")
 
     @property
     def is_stepping(self) -> bool:
@@ -304,7 +305,7 @@ class Runner:
         """Wait until a robot that steps for balance stands again."""
         if self.is_stepping:
             self.until(lambda: not self.is_stepping, STEPS_LIMIT, "stand again")
-            self.settle("stand again", is_standing)
+            self.settle("stand again", standing)
 
     def let_pass(self, seconds: float) -> None:
         """Let time pass, whatever happens in it."""

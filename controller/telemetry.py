@@ -16,6 +16,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import note_peaks
 from go2_wbc.robot.payload import NO_PAYLOAD
 from go2_wbc.robot.state import Snapshot
+from go2_wbc.validation import LARGEST, is_finite_number
 
 BLOCK = 4096
 """Ticks whose memory is asked for at once, 2.4 MB: numpy wants huge pages for 4 MB and more, and
@@ -105,8 +106,8 @@ class Telemetry:
         Raises:
             CommandError: if ``rate`` is not a positive number.
         """
-        if not rate > 0.0:
-            raise CommandError(f"rate must be positive, got {rate}")
+        if not (is_finite_number(rate) and 0.0 < rate <= LARGEST):
+            raise CommandError(f"rate must be positive, got {rate!r:.80}")
         order = np.arange(max(0, self._count - self._capacity), self._count)
         rows = order % self._capacity
         times = self._taken(rows, slice(0, 1))[:, 0]
@@ -127,6 +128,7 @@ class Telemetry:
             p_world_com=taken[:, _COM],
             support_margin=np.full(len(rows), np.nan),
             labels=labels,
+            robot=self._model.description.profile.name,
         )
         return Samples(recording, taken[:, _FEET].reshape(-1, 4, 3))
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from controller.behaviours.walking import Walking
-from controller.checks import is_calm
+from controller.checks import calm
+from controller.modes import Limited
 from controller.runner import Runner
 from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS, Gait, find_gait
@@ -11,6 +12,7 @@ from go2_wbc.errors import CommandError, unknown_name
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.envelopes import AUTO, LADDER, GaitChoice, envelope_of
 from go2_wbc.planning.trunk import LEVEL, BodyPose
+from go2_wbc.robot.state import Snapshot
 
 STOP_LIMIT = 4.0
 """Time [s] in which a walking robot must come to rest after ``stop``."""
@@ -28,17 +30,16 @@ class Walker:
     def __init__(self, runner: Runner, config: Config) -> None:
         """Walk on ``runner``, at first with the trot."""
         self._runner, self._config = runner, config
-        self.walking = self._make(find_gait("trot"), None)
+        self.walking = Walking(runner.loop.model, find_gait("trot"), config.locomotion)
         self._envelope = self._envelope_of(self.walking)
 
-    def _make(self, gait: Gait, friction: float | None) -> Walking:
-        return Walking(self._runner.loop.model, gait, self._config.locomotion, friction)
-
-    @property
-    def limits(self) -> str:
-        """The envelope of the gait, in plain words."""
+    def excess(self, command: VelocityCommand) -> tuple[int, str]:
+        """How far ``command`` is beyond the gait's envelope (0 if not, 2 by far), and in words."""
+        if not (excess := self._envelope.excess(command)):
+            return 0, ""
         name = self.walking.gait.name if self.walking.choice is None else AUTO
-        return f"the envelope of gait {name!r} is {self._envelope}"
+        told = f"{excess}; the envelope of gait {name!r} is {self._envelope}"
+        return 1 + self._envelope.is_far(command), told
 
     @property
     def command(self) -> VelocityCommand:
@@ -54,7 +55,8 @@ class Walker:
         """Stand ready to walk with ``gait``."""
         choice = self._choice(gait)
         gait = find_gait(LADDER[0] if gait == AUTO else gait)
-        walking = self._make(gait, self.walking.friction)
+        model, before = self._runner.loop.model, self.walking
+        walking = Walking(model, gait, self._config.locomotion, before.friction, before.has_slid)
         walking.choice = choice
         self._runner.engage(walking)
         self.walking = walking
@@ -139,7 +141,11 @@ class Walker:
         """Let the steps come to an end, and what is left of the trunk's motion."""
         self.finish(what)
         walking = self.walking
-        self._runner.settle(what, lambda now: walking.is_finished(now) and is_calm(now))
+
+        def asked(now: Snapshot) -> Limited:
+            return {"steps to be ended": (float(not walking.is_finished(now)), 1.0), **calm(now)}
+
+        self._runner.settle(what, asked)
 
     def square_up(self) -> bool:
         """Start to put the feet below the hips; returns whether they are."""

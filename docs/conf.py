@@ -63,6 +63,7 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sphinx = False
 html_copy_source = False
+html_search_scorer = str(ROOT / "docs/_ext/search_scorer.js")  # guides first
 html_theme_options = {
     "light_css_variables": {"color-brand-primary": "#1d4ed8", "color-brand-content": "#1d4ed8"},
     "dark_css_variables": {"color-brand-primary": "#7dabff", "color-brand-content": "#7dabff"},

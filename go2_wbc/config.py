@@ -20,8 +20,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
-from go2_wbc.errors import ConfigError, unknown_name
+from go2_wbc.errors import ConfigError, SolverUnavailable, unknown_name
 from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.planning.command import VelocityEnvelope
 from go2_wbc.planning.locomotion import LocomotionConfig
@@ -29,14 +30,16 @@ from go2_wbc.planning.trunk import PoseEnvelope
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.motor import TORQUE_SPEED, require_motor
 from go2_wbc.robot.payload_estimation import PayloadConfig
-from go2_wbc.robot.profile import GO2, find_profile
+from go2_wbc.robot.profile import GO2, find_profile, profile_names
 from go2_wbc.robot.safety import SafetyConfig
 from go2_wbc.validation import is_finite_number
 from go2_wbc.wbc.config import WbcConfig
+from go2_wbc.wbc.controller import BACKENDS
 
 _Part = TypeVar("_Part")
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 class Config:
     """The engine's numbers.
@@ -73,8 +76,10 @@ class Config:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for an unknown motor or robot."""
+        """Raise ConfigError for an unknown motor, robot or back end."""
         require_motor(self.motor)
+        if self.backend not in BACKENDS:
+            raise ConfigError(unknown_name("WBC back end", self.backend, BACKENDS))
         find_profile(self.robot)
 
     @staticmethod
@@ -97,6 +102,7 @@ class Config:
         return dataclasses.replace(self, envelope=self.cautious_envelope)
 
 
+@typed()
 def load_config(path: Path | str) -> Config:
     """The default configuration, or that of its ``robot``, with the overrides of a TOML file.
 
@@ -110,7 +116,9 @@ def load_config(path: Path | str) -> Config:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path} is not valid TOML: {error}") from error
     robot = overrides.get("robot", GO2)
-    own = Config.of_robot(robot) if isinstance(robot, str) else Config()
+    if robot not in profile_names():
+        raise ConfigError(f"{path}: {unknown_name('robot', str(robot), profile_names())}")
+    own = Config.of_robot(robot)
     return override(own, overrides, where=str(path))
 
 
@@ -132,7 +140,10 @@ def override(part: _Part, values: Mapping[str, Any], where: str) -> _Part:
             raise ConfigError(f"{where}: {unknown_name('key', key, fields)}")
         before = VelocityEnvelope() if fields[key] is None else fields[key]  # not configured yet
         changes[key] = _convert(before, value, f"{where}: {key}")
-    return dataclasses.replace(part, **changes)  # type: ignore[type-var]
+    try:
+        return dataclasses.replace(part, **changes)  # type: ignore[type-var]
+    except (ConfigError, SolverUnavailable) as error:
+        raise type(error)(f"{where}: {error}") from None
 
 
 def _convert(current: object, value: object, where: str) -> object:

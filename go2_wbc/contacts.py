@@ -14,6 +14,7 @@ from dataclasses import InitVar, dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.errors import CommandError, ConfigError, unknown_name
 from go2_wbc.legs import LEGS
@@ -54,6 +55,7 @@ class ContactPhase:
         return np.where(self.stance, np.clip(nearest_change / max(ramp, TIE), 0.0, 1.0), 0.0)
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 class ContactSchedule:
     """Events in increasing order: from ``times[i]`` on, the feet ``modes[i]`` are in stance.
@@ -79,7 +81,9 @@ class ContactSchedule:
         """Check the order of the events and find each foot's changes."""
         rising = all(b > a for a, b in zip(self.times[:-1], self.times[1:], strict=True))
         if not self.times or not rising or len(self.modes) != len(self.times):
-            raise CommandError(f"contact events need increasing times, got {self.times}")
+            raise CommandError(
+                f"contact events need increasing times, and as many modes, got {self.times}"
+            )
         if self.period is not None and (self.times[0] != 0.0 or self.times[-1] >= self.period):
             raise CommandError(
                 f"periodic contact events must start at 0 and end before the period of "
@@ -103,6 +107,7 @@ class ContactSchedule:
             before, after = changes[-1] - self.period, changes[0] + self.period
         return np.array([before, *changes, after])
 
+    @typed(late=True)
     def at(self, t: float) -> ContactPhase:
         """The contacts at ``t`` seconds after the schedule's start."""
         if self.period is not None:
@@ -112,6 +117,7 @@ class ContactSchedule:
         elapsed = np.maximum(t - self.since[index], 0.0)
         return ContactPhase(self.modes[index].copy(), elapsed, self.until[index] - t)
 
+    @typed(late=True)
     def at_times(self, times: Float[np.ndarray, " n"]) -> ContactPhase:
         """The contacts at many instants [s], (n, 4): those that ``at`` gives for each."""
         if self.period is not None:
@@ -151,6 +157,7 @@ class Stride:
             )
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @retires(needs_mpc=Retired(True, "the forces of every gait are planned ahead"))
 @ranged(period=POSITIVE, duty=SHARE, envelope_share=SHARE, width=SHARE)
@@ -205,6 +212,7 @@ class Gait:
         """Seconds that a foot swings in each stride."""
         return (1.0 - self.duty) * self.period
 
+    @typed()
     def placed(self, p_base_feet: Float[np.ndarray, "4 3"]) -> Float[np.ndarray, "4 3"]:
         """The standing robot's feet, or what else has two sides, as far apart as in this gait."""
         return p_base_feet * [1.0, self.width, 1.0]
@@ -215,6 +223,12 @@ class Gait:
         offsets = np.array(self.offsets)
         phase = (offsets[:, None] - offsets + TIE) % 1.0 - TIE
         return bool((phase <= self.duty + TIE).all(axis=1).any())
+
+    @property
+    def stands_beside_com(self) -> bool:
+        """Whether at times only the feet of one side, or of one end, stand."""
+        pairs = {frozenset(pair) for pair in ((0, 2), (1, 3), (0, 1), (2, 3))}
+        return any(frozenset(np.flatnonzero(mode)) in pairs for mode in self.schedule().modes)
 
     @property
     def has_flight(self) -> bool:

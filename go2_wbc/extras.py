@@ -10,6 +10,8 @@ EXTRAS: Mapping[str, str] = {
     "sweep": "sweeps as Parquet files",
     "cluster": "sweeps on many machines",
     "gamepad": "a gamepad for teleop",
+    "mcap": "recordings as MCAP files, for Foxglove",
+    "rerun": "recordings as rrd files, for Rerun (490 MB)",
     "examples": "what some examples show their point with",
     "notebooks": "the notebooks: jupyter lab",
     "unitree": "Unitree's protocol: unitree-sim, unitree-drive",

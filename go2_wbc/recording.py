@@ -7,21 +7,27 @@ from __future__ import annotations
 
 import io
 import zipfile
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from importlib.metadata import entry_points
 from itertools import groupby, pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from go2_wbc.arguments import typed
 from go2_wbc.brief import cut, inline_html
 from go2_wbc.errors import ConfigError, MissingDependency
-from go2_wbc.extras import install_line
+from go2_wbc.extras import EXTRAS, install_line
 from go2_wbc.files import checked_output, write_atomically
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.figure import Figure
+
+EXPORTS = {".mcap": "mcap", ".rrd": "rerun"}
+"""Files for other viewers, and the extra that each needs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +44,7 @@ class Span:
     label: str
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 class Recording:
     """Samples of one run, all of the same length n.
@@ -53,6 +60,8 @@ class Recording:
         support_margin: (n,) distance [m] of the CoM's ground projection to the edge of the
             support polygon of the planned stance feet, positive inside; nan with fewer than three.
         labels: what the robot was doing at each sample ("stand", "walk", ...), length n.
+        robot: name of the robot's profile.
+        model_file: its own MJCF or URDF, by which it is drawn; empty if it has none.
     """
 
     time: Float[np.ndarray, " n"]
@@ -64,6 +73,8 @@ class Recording:
     p_world_com: Float[np.ndarray, "n 3"]
     support_margin: Float[np.ndarray, " n"]
     labels: tuple[str, ...]
+    robot: str = "go2"
+    model_file: str = ""
 
     _repr_html_ = inline_html
 
@@ -77,6 +88,7 @@ class Recording:
         """Seconds between the first and the last sample."""
         return float(self.time[-1] - self.time[0]) if len(self.time) else 0.0
 
+    @typed(late=True)
     def part(self, rows: slice | Int[np.ndarray, " k"]) -> Recording:
         """Some of the samples, with their times unchanged.
 
@@ -84,9 +96,10 @@ class Recording:
             rows: of the samples to keep, in increasing order.
         """
         labels = np.array(self.labels, dtype=object)[rows]
-        arrays = (getattr(self, field.name)[rows] for field in fields(self)[:-1])
-        return Recording(*arrays, labels=tuple(labels))
+        arrays = {name: getattr(self, name)[rows] for name in _ARRAYS}
+        return replace(self, **arrays, labels=tuple(labels))
 
+    @typed()
     def save(self, path: Path | str) -> Path:
         """Write it to a ``.npz`` file, which ``load`` and ``numpy.load`` read; gives its path.
 
@@ -99,18 +112,23 @@ class Recording:
         return write_atomically(target, stream.getvalue())
 
     @staticmethod
+    @typed()
     def load(path: Path | str) -> Recording:
-        """What ``save`` has written.
+        """What ``save`` has written, also before a recording said which robot it holds: a Go2.
 
         Raises:
             ConfigError: if the file is missing, damaged, or no recording.
         """
         try:
             with np.load(io.BytesIO(Path(path).read_bytes()), allow_pickle=False) as file:
-                *arrays, labels = (file[field.name] for field in fields(Recording))
+                values: dict[str, Any] = {name: file[name] for name in _ARRAYS}
+                values |= {
+                    name: str(file[name]) for name in ("robot", "model_file") if name in file
+                }
+                labels = tuple(file["labels"].tolist())
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
             raise ConfigError(f"{path} is missing, damaged, or no recording of save()") from error
-        return Recording(*arrays, labels=tuple(labels.tolist()))
+        return Recording(**values, labels=labels)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """A pandas table, a row for each sample: ``time``, ``label``, ``q0`` to ``q18`` and so on.
@@ -124,13 +142,37 @@ class Recording:
             line = install_line("examples")
             raise MissingDependency(f"a table needs pandas ({error}): {line}") from error
         columns: dict[str, object] = {"time": self.time, "label": self.labels}
-        for field in fields(self)[1:-1]:
-            values = getattr(self, field.name)
+        for name in _ARRAYS[1:]:
+            values = getattr(self, name)
             if values.ndim == 1:
-                columns[field.name] = values
+                columns[name] = values
             else:
-                columns |= {f"{field.name}{i}": column for i, column in enumerate(values.T)}
+                columns |= {f"{name}{i}": column for i, column in enumerate(values.T)}
         return pandas.DataFrame(columns)
+
+    @typed()
+    def export(self, path: Path | str) -> Path:
+        """Write it for other viewers: ``.mcap`` for Foxglove, ``.rrd`` for Rerun; gives its path.
+
+        Raises:
+            ConfigError: for another ending, a place that cannot be written to, or no sample.
+            MissingDependency: without the extra; says how to get it.
+        """
+        target = checked_output(path, list(EXPORTS))
+        return write_atomically(target, viewer(EXPORTS[target.suffix])(self._with_samples()))
+
+    def plot(self) -> Figure:
+        """Trunk, feet, and torques against a Go2's limits over time; needs no display.
+
+        Raises:
+            ConfigError: for a recording without a sample.
+        """
+        return viewer("plot")(self._with_samples())
+
+    def _with_samples(self) -> Recording:
+        if not len(self.time):
+            raise ConfigError("the recording has no sample")
+        return self
 
     def spans(self) -> tuple[Span, ...]:
         """Stretches of equal labels, in order; each ends where the next begins."""
@@ -140,3 +182,21 @@ class Recording:
             Span(float(time[start]), float(time[end]), labels[start])
             for start, end in pairwise([*starts, len(labels) - 1])
         )
+
+
+def viewer(name: str) -> Any:  # noqa: ANN401 - each makes something else of a recording
+    """What makes a plot, or the content of a file, of a recording: an entry point, as of ``viz``.
+
+    Raises:
+        MissingDependency: without the extra of this name; says how to get it.
+    """
+    entries = [*entry_points(group="go2_wbc.recording", name=name)]
+    try:
+        return entries[0].load()
+    except (ImportError, IndexError) as error:
+        line = install_line(name) if name in EXTRAS else "python -m pip install go2-wbc"
+        raise MissingDependency(f"{name} is not installed ({error}): {line}") from error
+
+
+_ARRAYS = tuple(field.name for field in fields(Recording))[:8]
+"""The fields that have a row for each sample."""

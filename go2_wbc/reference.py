@@ -15,11 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.algebra.linear import cross, dot, triple
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
-from go2_wbc.compilation import kernel
+from go2_wbc.compilation import Foreign, kernel
 from go2_wbc.errors import CommandError
 from go2_wbc.lazy import moved_names
-from go2_wbc.records import Array4, Record
+from go2_wbc.records import Array4, Array12, Record
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.state import Snapshot
 
@@ -82,27 +84,38 @@ def sag_and_lean(target: Target, now: Snapshot) -> tuple[float, float]:
     return target.p_world[2] - measured, np.arccos(min(max(cosine, -1.0), 1.0))
 
 
-REACH, STILL = 0.2, 0.5
-"""Distance [m] of a foot from its joints, roughly; and speed [m/s] of one that stays."""
+ASTRAY, STILL = 0.02, 0.3
+"""Distance [m] of a foot from where it shall be, and speed [m/s] below which it stays there."""
 
 
 @kernel
-def feet_astray(target: Target, now: Snapshot, astray: Array4) -> float:
-    """Fill how far each foot is that stays where it shall not, in the air [m]; 0 for the others.
+def hold_feet(target: Target, now: Snapshot, tau: Foreign[Array12], held: Array4) -> float:
+    """Fill with what force [N] each foot is held that stays where it shall not, in the air.
 
-    Returns the greatest.
+    With e the way to where it shall be, and the torques ``tau`` that the motors give,
+    e . J^-T (tau - h) / |e|; 0 for the others. Returns the greatest.
     """
+    way, axes = np.empty(3), np.empty((3, 3))
     for leg in range(4):
-        square, speed = 0.0, 0.0
+        held[leg], square, speed, j = 0.0, 0.0, 0.0, 3 * leg
+        if target.legs[leg] == STANCE:
+            continue
         for i in range(3):
-            j = 3 * leg + i
-            if target.legs[leg] == SWING:
-                square += (target.p_world_feet[leg, i] - now.p_world_feet[leg, i]) ** 2
-            elif target.legs[leg] == JOINTS:
-                square += (REACH * (target.q_joints[j] - now.q[7 + j])) ** 2
+            way[i] = target.p_world_feet[leg, i] - now.p_world_feet[leg, i]
+            turned = 0.0
+            for k in range(3):
+                axes[k, i] = now.J_feet[leg, i, 6 + j + k]
+                turned += axes[k, i] * (target.q_joints[j + k] - now.q[7 + j + k])
+            way[i] = turned if target.legs[leg] == JOINTS else way[i]
+            square += way[i] ** 2
             speed += now.v_world_feet[leg, i] ** 2
-        astray[leg] = np.sqrt(square) if speed < STILL**2 else 0.0
-    return float(np.max(astray))
+        a, b, c, e = triple(axes[0]), triple(axes[1]), triple(axes[2]), triple(way)
+        det = dot(a, cross(b, c))
+        if square > ASTRAY**2 and speed < STILL**2 and abs(det) > 1e-6:  # not stretched
+            load = triple(tau[j : j + 3] - now.bias[6 + j : 9 + j])
+            work = load[0] * dot(e, cross(b, c)) + load[1] * dot(e, cross(c, a))
+            held[leg] = (work + load[2] * dot(e, cross(a, b))) / (det * np.sqrt(square))
+    return float(np.max(held))
 
 
 _LEG_TASKS = tuple(LegTask)
@@ -265,6 +278,7 @@ class Reference:
             _set(self, "_row", row)
         return row
 
+    @typed(late=True)
     def placed(self, anchor: Anchor) -> Reference:
         """This reference, given in the frame of a motion, in the world."""
         R, body = yaw_rotation(anchor.yaw), self.body

@@ -37,6 +37,8 @@ class Rule:
     holds: Callable[[float], bool]
 
 
+LARGEST = 1e9
+"""No number of a robot of 15 kg is larger, in SI units: more is a slip of the pen."""
 POSITIVE = Rule("positive", lambda value: value > 0.0)
 NOT_NEGATIVE = Rule("at least 0", lambda value: value >= 0.0)
 FINITE = Rule("finite", lambda _: True)
@@ -137,6 +139,10 @@ def require(config: object, rule: Rule, *names: str) -> None:
             if not (is_finite_number(value) and rule.holds(float(value))):
                 raise ConfigError(
                     f"{type(config).__name__}.{name} must be {rule.what}, got {field!r}"
+                )
+            if abs(value) > LARGEST:
+                raise ConfigError(
+                    f"{type(config).__name__}.{name} must be {LARGEST:g} at most, got {field!r}"
                 )
 
 

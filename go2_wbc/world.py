@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.validation import between, ranged, require
@@ -82,6 +83,7 @@ class World:
             own = replace(own, friction=friction)
         return own if payload is None else replace(own, payload=payload)
 
+    @typed()
     def sample(self, rng: np.random.Generator) -> World:
         """A world within the uncertainties, without any of its own; each is drawn evenly."""
         return self._shifted(rng.uniform(-1.0, 1.0, len(_UNCERTAIN)).tolist())

@@ -9,6 +9,7 @@ from typing import TypeVar
 
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
+from go2_wbc.validation import LARGEST
 from go2_wbc.validation import is_finite_number as is_number
 
 FARTHEST = 1.5
@@ -34,8 +35,8 @@ def positive(name: str, value: float) -> float:
     Raises:
         TimelineError: if it is not a number above 0.
     """
-    if not (is_number(value) and value > 0.0):
-        raise TimelineError(f"{name} must be a number above 0, got {value!r}")
+    if not (is_number(value) and 0.0 < value <= LARGEST):
+        raise TimelineError(f"{name} must be a number above 0, got {value!r:.80}")
     return float(value)
 
 

@@ -19,6 +19,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
+from go2_wbc.arguments import typed
 from go2_wbc.brief import cut
 from go2_wbc.errors import CommandError, TimelineError, unknown_name
 from motions.arguments import is_number
@@ -48,6 +49,7 @@ def _parse_value(text: str) -> tuple[str, Value]:
     return name, value
 
 
+@typed(error=TimelineError)
 @dataclass(frozen=True, slots=True)
 class Range:
     """Numbers from ``low`` to ``high``, in ``unit``."""
@@ -67,6 +69,7 @@ class Choice:
 
     words: tuple[str, ...]
 
+    @typed(error=TimelineError)
     def __init__(self, *words: str) -> None:
         """The valid ``words``."""
         object.__setattr__(self, "words", words)
@@ -182,6 +185,7 @@ def last_line(error: Exception, file: str) -> int | None:
     return lines[-1] if lines else None
 
 
+@typed(error=TimelineError)
 def motion(function: Callable[..., Timeline]) -> Motion:
     """Makes a motion of ``function``, which is named after it.
 

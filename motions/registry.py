@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import CommandError, TimelineError, unknown_name
 from motions.authoring import Motion, Value, last_line
 from motions.language.timeline import Timeline
@@ -36,6 +37,7 @@ def _homes() -> Mapping[str, str]:
     return dict(sorted(found.items()))
 
 
+@typed(error=CommandError)
 def find_motion(name: str) -> Motion:
     """The motion of the library with that name.
 
@@ -68,6 +70,7 @@ def is_saved_motion(name: str | Path) -> bool:
     return str(name).endswith(MOTION_FORMAT.suffix)
 
 
+@typed()
 def load_file(path: Path | str) -> Mapping[str, Motion]:
     """The motions that a Python file defines, by name.
 

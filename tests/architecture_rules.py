@@ -25,7 +25,7 @@ FENCES: dict[str, tuple[str, ...]] = {
         "benchmarks/model.py",
     ),
     "meshcat": ("viz/*",),
-    "matplotlib": ("viz/*",),
+    "matplotlib": ("viz/*", "go2_wbc/recording.py"),  # there only the type of a plot
     "placo": (
         "go2_wbc/wbc/placo_backend.py",
         "go2_wbc/robot/inverse_kinematics.py",
@@ -38,6 +38,8 @@ FENCES: dict[str, tuple[str, ...]] = {
     "cyclonedds": ("controller/bridges/*",),
     "ray": ("controller/sweeps/ray_engine.py",),
     "pyarrow": ("controller/sweeps/export.py",),
+    "mcap": ("viz/replay/mcap_file.py",),
+    "rerun": ("viz/replay/rerun_file.py",),
     "sqlite3": ("controller/sweeps/sweep_file.py",),
 }
 """The only files that may import each of these libraries."""
@@ -47,6 +49,7 @@ DISTRIBUTIONS = {"pinocchio": "pin", "PIL": "pillow", "collada": "pycollada"}
 
 OPTIONAL = frozenset(
     {"rclpy", "cyclonedds", "crocoddyl", "librosa", "soundfile", "ray", "pyarrow", "pandas"}
+    | {"mcap", "rerun"}
 )
 """Libraries that are imported only by those who have them; their fences keep them apart."""
 

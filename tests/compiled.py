@@ -1,7 +1,5 @@
 """Compiled against plain: a kernel does what the Python that it is written in does."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from benchmarks.plain import NEAR, copied, difference

@@ -5,11 +5,10 @@ repetitions in long loops are checked now and again only (see ``tests/typechecke
 ``GO2_WBC_TYPECHECK=0`` switches them off. pytest-xdist workers load this file too.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
@@ -17,6 +16,10 @@ from jaxtyping import install_import_hook
 
 from go2_wbc.compilation import load_kernels
 from tests import typechecker
+
+if TYPE_CHECKING:
+    from go2_wbc.robot.model import RobotModel
+    from motions import FeasibilityChecker
 
 ROOT = Path(__file__).resolve().parent.parent
 LONGEST = tuple(
@@ -27,7 +30,6 @@ LONGEST = tuple(
         "test_notebooks.py",
         "controller/bridges/unitree/test_foreign_peers.py",
         "test_docs.py",
-        "test_site.py",
         "viz/replay/test_plan_browser.py",
         "viz/replay/test_live_browser.py",
         "viz/replay/test_browser.py",
@@ -112,3 +114,19 @@ settings.load_profile("go2_wbc")
 
 # Compiled before any test, so that none of them, nor a script it starts, says that it compiles.
 load_kernels()
+
+
+@pytest.fixture(scope="session")
+def model() -> "RobotModel":
+    """The robot; no test changes it."""
+    from go2_wbc.robot.model import RobotModel
+
+    return RobotModel()
+
+
+@pytest.fixture(scope="session")
+def checker(model: "RobotModel") -> "FeasibilityChecker":
+    """What checks motions on it."""
+    from motions import FeasibilityChecker
+
+    return FeasibilityChecker(model)

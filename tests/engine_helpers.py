@@ -1,7 +1,5 @@
 """Random states, references, trajectories and mirror images that the engine's tests share."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 

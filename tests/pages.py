@@ -10,8 +10,6 @@ A ``text`` block right after a ``sh`` or ``python`` block is its output. Words m
 nearly; ``...`` as a line stands for any lines, and at the end of a line for the rest of it.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

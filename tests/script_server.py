@@ -6,8 +6,6 @@ environment, arguments, module search path and ``__main__``, loads this project'
 and ends as every interpreter does.
 """
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import functools

@@ -1,7 +1,5 @@
 """Tests that solve dynamic motions: they need the extra [dynamics], and may be told to have it."""
 
-from __future__ import annotations
-
 import os
 from importlib.util import find_spec
 

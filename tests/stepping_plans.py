@@ -1,7 +1,5 @@
 """Small plans whose feet step, written by hand: a step to a new place, and a hop."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 How a block is taken is said in ``tests/pages.py``.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import inspect
 import re
@@ -210,11 +208,6 @@ def test_the_reference_has_errors() -> None:
 
 
 # --- feasibility ------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def checker() -> FeasibilityChecker:
-    return FeasibilityChecker()
 
 
 def test_every_check_that_the_report_can_name_is_explained(checker: FeasibilityChecker) -> None:

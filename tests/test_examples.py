@@ -1,7 +1,5 @@
 """Every example runs, prints its point, says nothing bad, and fails aloud when the point fails."""
 
-from __future__ import annotations
-
 import ast
 import importlib.util
 import os

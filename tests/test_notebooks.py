@@ -1,7 +1,5 @@
 """The notebooks run from a clean kernel, say what their committed outputs say, and are small."""
 
-from __future__ import annotations
-
 import ast
 import importlib.util
 import json
@@ -26,6 +24,9 @@ HANGS = 600.0
 """Time [s] after which a notebook counts as hanging; each takes about 15 s of CPU."""
 NEAR = 0.1
 """Relative difference from the committed numbers: a run repeats to the bit on one machine only."""
+QUANTITY = re.compile(r"(\d+(?:\.\d+)?) (mm|cm|m/s|m|rad|deg|s|ms|N m|N s|N|kg|MB|%)(?![\w^])")
+"""A number with its unit, and how many of the base unit that is."""
+SCALES = {"mm": 1e-3, "cm": 1e-2, "ms": 1e-3, "%": 1e-2}
 ROUNDING = re.compile(r"\d(\.\d+)?e-\d\d")
 """Errors of rounding, which differ between machines."""
 MACHINE = re.compile(r"/(home|root|work|tmp|Users|usr|opt|var)/|[A-Z]:\\")
@@ -119,6 +120,23 @@ def test_a_notebook_explains_itself_and_links_to_what_exists(notebook: Path) -> 
             assert (FOLDER / target).exists(), target
         for target in re.findall(r"`((?:docs|examples|go2_wbc)/[a-z0-9_/.]*)`", text):
             assert (ROOT / target).exists(), target
+
+
+def numbers(text: str) -> list[float]:
+    return [abs(float(word)) for word in re.findall(r"\d+(?:\.\d+)?(?:e-?\d+)?", text)]
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=name_of)
+def test_a_quantity_that_the_prose_states_is_computed_or_given_in_a_cell(notebook: Path) -> None:
+    """A text told of calves beyond their limit where its own table showed that they were not."""
+    code = cells(notebook)
+    known = numbers("\n".join(f"{''.join(cell['source'])}\n{printed(cell)}" for cell in code))
+    for text in ("".join(cell["source"]) for cell in cells(notebook, "markdown")):
+        for word, unit in QUANTITY.findall(text):
+            scale, digits = SCALES.get(unit, 1.0), len(word.partition(".")[2])
+            rounding = (0.5 * 10.0**-digits + 1e-9) * scale
+            stated = float(word) * scale
+            assert any(abs(number - stated) <= rounding for number in known), f"{word} {unit}"
 
 
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=name_of)

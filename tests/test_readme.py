@@ -1,7 +1,5 @@
 """The README's first screen, and what all pages have in common: commands, links, width."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from types import ModuleType

@@ -1,7 +1,5 @@
 """What objects say of themselves at the prompt."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from collections.abc import Iterator

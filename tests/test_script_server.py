@@ -1,7 +1,5 @@
 """A program that the server runs cannot tell that Python did not start it itself."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -79,6 +79,7 @@ from viz import (
     PLOT_SUFFIXES,
     Annotation,
     MarginCurve,
+    Relation,
     ReplayContent,
     Verdict,
     export_animation,
@@ -86,6 +87,7 @@ from viz import (
     export_filmstrip,
     export_html,
     export_plot,
+    export_relations,
     margin_figure,
 )
 
@@ -185,11 +187,12 @@ def show(recording: Recording) -> None:
     """Pages, films and plots."""
     verdict = Verdict(ok=True, text="done", annotations=(), curves=())
     content = ReplayContent(recording, verdict=verdict)
-    kinds: list[type] = [Annotation, MarginCurve]
+    kinds: list[type] = [Annotation, MarginCurve, Relation]
     export_html(content, Path(f"page{HTML_SUFFIXES[0]}"), title="A page")
     export_animation(content, Path(f"film{ANIMATION_SUFFIXES[0]}"))
     export_filmstrip(recording, Path("strip.png"))
     print(kinds, PLOT_SUFFIXES, export_plot, export_distributions, margin_figure)
+    print(export_relations)
 
 
 def many() -> Certificate:

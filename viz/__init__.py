@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from viz.render.animation import ANIMATION_SUFFIXES, export_animation
     from viz.render.distribution_plot import export_distributions
     from viz.render.margin_plot import export_plot, margin_figure
+    from viz.render.relation_plot import Relation, export_relations
     from viz.render.still import export_filmstrip
     from viz.replay.html_page import HTML_SUFFIXES, export_html
     from viz.style import PLOT_SUFFIXES
@@ -21,6 +22,7 @@ __all__ = [
     "PLOT_SUFFIXES",
     "Annotation",
     "MarginCurve",
+    "Relation",
     "ReplayContent",
     "Verdict",
     "export_animation",
@@ -28,6 +30,7 @@ __all__ = [
     "export_filmstrip",
     "export_html",
     "export_plot",
+    "export_relations",
     "margin_figure",
 ]
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
@@ -20,6 +21,7 @@ CENTRE_OF_MASS = "com"
 _LEAST_SAMPLES = 2
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 class MarginCurve:
     """What is left to one limit over time: the least of all its subjects.
@@ -56,6 +58,7 @@ class MarginCurve:
         return self.least < 0.0
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 class Annotation:
     """A limit that one subject breaks, or nearly does.
@@ -121,6 +124,7 @@ class CertifiedRate:
     outdated: str = ""
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 class Verdict:
     """What a check says of a movement.
@@ -172,6 +176,7 @@ class Slider:
     words: tuple[str, ...] = ()
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 class ReplayContent:
     """What to show.
@@ -188,6 +193,7 @@ class ReplayContent:
         sliders: parameters that a live page lets one choose.
         sound: an MP3 file that starts with the recording, played in step with it; empty for none.
         end_pose: where the movement shall end: x, y [m] and yaw [rad] of the frame of the feet.
+        bar: beats of a bar, and the number of the beat on which the first begins.
     """
 
     recording: Recording
@@ -199,6 +205,7 @@ class ReplayContent:
     sliders: tuple[Slider, ...] = ()
     sound: bytes = b""
     end_pose: tuple[float, float, float] | None = None
+    bar: tuple[int, int] = (4, 0)
 
     __repr__ = brief
 

@@ -1,7 +1,5 @@
 """``python -m benchmarks bridges``: ROS 2 and Unitree's protocol, measured between processes."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 
@@ -9,16 +7,11 @@ from benchmarks.bridges import ros2, unitree
 from benchmarks.command import Benchmark, run_and_report
 from benchmarks.study import chosen_studies, tasks_of
 from controller.bridges.unitree import require_dds
-from go2_wbc.errors import CommandError, MissingDependency
+from go2_wbc.errors import MissingDependency
 
 STUDIES = (ros2.STUDY, *unitree.STUDIES)
 REQUIREMENTS = {"ros2": ros2.require, "unitree": require_dds}
 """By group: raises ``MissingDependency`` if what it needs is not installed."""
-TESTED = {
-    "ros2-faults": "tests/controller/bridges/test_ros2_faults.py",
-    "unitree-faults": "tests/controller/bridges/unitree/test_faults.py",
-}
-"""What was a benchmark, and the tests that it is now."""
 BENCHMARK = Benchmark(
     "bridges",
     "A server in a process of its own, on the loopback: answers, losses, latencies,\n"
@@ -35,13 +28,7 @@ register = BENCHMARK.register
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run what was asked for and can be run; without names, what cannot is only told.
-
-    Raises:
-        CommandError: for a name of what tests do now.
-    """
-    if moved := [name for name in args.names if name in TESTED]:
-        raise CommandError(f"{moved[0]} is a test now: pytest {TESTED[moved[0]]}")
+    """Run what was asked for and can be run; without names, what cannot is only told."""
     studies = chosen_studies(STUDIES, args.names)
     for group in () if args.list else dict.fromkeys(s.group for s in studies):
         try:

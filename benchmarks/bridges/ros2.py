@@ -1,7 +1,5 @@
 """ROS 2 between real processes on the loopback: calls, velocity commands, the course's demo."""
 
-from __future__ import annotations
-
 import math
 import time
 from contextlib import closing

@@ -1,7 +1,5 @@
 """Unitree's protocol between real processes on the loopback: the sport service, the low level."""
 
-from __future__ import annotations
-
 import json
 import time
 import timeit
@@ -51,7 +49,7 @@ STREAM: Final = (
 )
 DRIVE: Final = (
     ("steps", "steps not done, of 4", "<= 0"),
-    ("mae", "trot 0.5, MAE of true speed", "<= 0.04 m/s"),
+    ("mae", "trot 0.5, true speed: MAE", "<= 0.04 m/s"),
 )
 
 

@@ -1,7 +1,5 @@
 """What the exam's motions are drawn from: families, and the random numbers of one draw."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Families of solved motions: jumps, hops, rears, pounces, pairs, phases, nearest motions."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from benchmarks.validation_set.drawing import Draw, Family, Write, named

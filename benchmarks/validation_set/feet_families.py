@@ -1,7 +1,5 @@
 """Families in which feet leave the ground: paws, taps, lifts in turn; and that go somewhere."""
 
-from __future__ import annotations
-
 from benchmarks.validation_set.drawing import (
     BODY_SIZES,
     Draw,

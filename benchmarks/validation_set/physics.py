@@ -3,8 +3,6 @@
 And at which amplitude it changes its mind: bisected by playing, and kept in a file.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

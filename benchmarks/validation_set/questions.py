@@ -1,7 +1,5 @@
 """The exam's motions: which family, which draw, which amplitude, and from which stratum."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 

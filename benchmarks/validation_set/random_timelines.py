@@ -6,8 +6,6 @@ A timeline is written six times, ever larger, quicker or both, until most cannot
 them judges.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal, TypeVar

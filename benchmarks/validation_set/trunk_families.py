@@ -1,7 +1,5 @@
 """Families in which four feet stand: trunk tracks alone and together, tempo, paths, postures."""
 
-from __future__ import annotations
-
 from benchmarks.validation_set.drawing import (
     BODY_SIZES,
     CHANNELS,

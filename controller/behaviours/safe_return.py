@@ -108,7 +108,6 @@ def nearest_safe_instant(
     Going back costs the time of turning round. Start and end of a plan are always safe.
 
     Args:
-        plan: to leave.
         t: from where [s].
         start, end: instants [s] between which it must be; the whole plan unless said otherwise.
             None is returned if there is none.

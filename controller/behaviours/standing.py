@@ -91,7 +91,7 @@ class Standing(ChangePosture):
             make_plan: as for ``ChangePosture``.
             model: of the robot that steps.
             config: how it steps.
-            friction: of the ground, as walks have shown it; None if they have not.
+            friction: of the ground, as feet have shown it that slid; None if none has.
         """
         super().__init__(make_plan)
         mpc = replace(config.mpc, least_share=SHARE_OF_NODE)
@@ -103,8 +103,7 @@ class Standing(ChangePosture):
             position_leash=SHORT_LEASH,
             mpc=mpc,
         )
-        is_slippery = friction is not None and friction < config.ground_friction
-        self._friction_of_steps = friction if is_slippery else MOST_FRICTION
+        self._friction_of_steps = MOST_FRICTION if friction is None else friction
         self._steps: Walking | None = None
 
     @property
@@ -164,7 +163,6 @@ def must_step(snapshot: Snapshot, offset: tuple[float, float]) -> bool:
     """Whether a robot that is up cannot come to rest above its feet.
 
     Args:
-        snapshot: of this tick.
         offset: place [m] of the capture point in the world, from the feet's middle.
     """
     if hypot(*offset) < WELL_INSIDE:

@@ -35,10 +35,11 @@ class Walking(Behaviour):
         gait: Gait,
         config: LocomotionConfig,
         friction: float | None = None,
+        has_slid: bool = True,
     ) -> None:
-        """Walk with ``gait``, on ground whose ``friction`` is known, or None."""
+        """Walk with ``gait``, on ground of which that is known; see ``LocomotionPlanner.start``."""
         self.gait = gait
-        self._known_friction = friction
+        self._known_friction, self._had_slid = friction, friction is not None and has_slid
         self.command: VelocityCommand = ZERO_COMMAND
         self.pose: BodyPose = LEVEL
         self.choice: GaitChoice | None = None
@@ -48,7 +49,7 @@ class Walking(Behaviour):
 
     def start(self, snapshot: Snapshot) -> None:
         """Start from the measured state, standing."""
-        self._planner.start(snapshot, self._known_friction)
+        self._planner.start(snapshot, self._known_friction, self._had_slid)
 
     def update(self, snapshot: Snapshot) -> Reference:
         """The planner's reference."""
@@ -97,6 +98,11 @@ class Walking(Behaviour):
     def friction(self) -> float | None:
         """Of the ground, as far as it is known; None if nothing is."""
         return self._planner.friction or self._known_friction
+
+    @property
+    def has_slid(self) -> bool:
+        """Whether a foot has, and has shown that friction."""
+        return self._planner.has_slid if self._planner.friction else self._had_slid
 
     @property
     def follows_command(self) -> bool:

@@ -10,8 +10,9 @@ from contextlib import closing
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
+from controller.bridges.unitree import LOOPBACK
 from controller.cli.common import ExitCode, print_json_line
-from controller.cli.options import Mjcf, Numbers
+from controller.cli.options import Mjcf, Numbers, dds_domain
 from go2_wbc.errors import PlantError
 from go2_wbc.world import SENSORS
 
@@ -49,8 +50,8 @@ def ros2(
 
 def unitree_sim(
     *,
-    domain: Annotated[int, "N", "default %(default)s"] = 1,
-    interface: Annotated[str, "NAME", "network, default %(default)s"] = "lo",
+    domain: Annotated[int, "N", "default %(default)s", dds_domain] = 1,
+    interface: Annotated[str, "NAME", "network, default %(default)s"] = LOOPBACK,
     mjcf: Mjcf = None,
     friction: Annotated[float | None, "MU", "of the feet, default 0.8"] = None,
     payload: Annotated[float, "KG", "extra mass"] = 0.0,
@@ -75,7 +76,8 @@ def unitree_sim(
     require_dds()
     from controller.bridges.unitree.simulator import SimulatorSettings, UnitreeSimulator
 
-    logging.getLogger("controller.bridges").setLevel(logging.INFO)
+    for name in ("controller.bridges", "controller.loop"):
+        logging.getLogger(name).setLevel(logging.INFO)
     stop = _until_signal()
     settings = SimulatorSettings(
         domain, interface, mjcf, friction, payload, sensors, seed, config, lockstep
@@ -93,8 +95,8 @@ def unitree_sim(
 
 def unitree_drive(
     *,
-    interface: Annotated[str, "NAME", "lo for a simulator"],
-    domain: Annotated[int, "N", "0 robot, 1 simulator"] = 0,
+    interface: Annotated[str, "NAME", f"{LOOPBACK} for a simulator"],
+    domain: Annotated[int, "N", "0 robot, 1 simulator", dds_domain] = 0,
     i_have_the_remote_in_hand: Annotated[bool, "required: you can stop it"] = False,
     steps: Annotated[
         tuple[str, ...],

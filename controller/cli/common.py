@@ -22,7 +22,16 @@ PROGRAM = "go2-wbc"
 
 
 class ExitCode(IntEnum):
-    """What the process tells its caller."""
+    """What the process tells its caller, whatever the command.
+
+    Attributes:
+        OK: it was done, or can be done.
+        FAILED: it was not done, or cannot be done.
+        USAGE: what was given cannot be used, an option, a name, a number or a file.
+        RUNTIME: something broke, or is missing on this machine.
+        INTERRUPTED: Ctrl-C, of what does not wait for it.
+        BROKEN_PIPE: who read the output has gone.
+    """
 
     OK = 0
     FAILED = 1
@@ -38,6 +47,7 @@ def add_parser(
     """Add the parser of the subcommand ``name``; its examples are one line each."""
     return subparsers.add_parser(
         name,
+        help=description.partition("\n")[0].replace("%", "%%"),
         description=description,
         epilog=examples_epilog(examples),
         formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -14,6 +14,7 @@ from controller.cli.progress import ProgressLine
 if TYPE_CHECKING:
     from motions import CheckedMotion, FeasibilityChecker
     from motions.music import Beats, Dance, DancedAccents
+    from viz import ReplayContent
 
 
 def run(
@@ -21,6 +22,7 @@ def run(
     *,
     seed: Annotated[int, "N", "another seed is another dance", whole] = 0,
     moves: Annotated[tuple[str, ...], "NAME", "only these; a wrong name lists all"] = (),
+    metre: Annotated[int | None, "N", "beats of a bar, 3 for a waltz; default: as heard"] = None,
     no_play: Annotated[bool, "compose and check it only"] = False,
     html: Annotated[Html, "write a 3D replay page with the music"] = None,
     json: Json = False,
@@ -33,6 +35,7 @@ def run(
     Examples:
         go2-wbc dance song.wav
         go2-wbc dance song.wav --seed 3 --html dance.html
+        go2-wbc dance waltz.mp3 --metre 3
         go2-wbc dance song.wav --moves nod sway twist tap_FR
         go2-wbc dance song.wav --no-play --json    its moves and their times
     """
@@ -43,7 +46,7 @@ def run(
 
     with ProgressLine(is_quiet=json) as line:
         line.update(0.0, f"listening to {song.name}")
-        found = beats(song)
+        found = beats(song, metre)
         line.update(0.1, "composing")
         checker = FeasibilityChecker(progress=line.solving)
         dance, checked = feasible_dance(found, seed, checker, moves)
@@ -55,8 +58,7 @@ def run(
             told |= measured
             ok = bool(measured["ok"])
         if html is not None:
-            shown = replace(content, beats=tuple(found.times.tolist()), sound=_music(song))
-            export_html(shown, html, title=dance.timeline.name)
+            export_html(_shown(content, dance, found, song), html, title=dance.timeline.name)
     if json:
         print_json(told)
     else:
@@ -82,6 +84,22 @@ def _played(
         content = performed(checked, go2.recording(), checker.model)
     reason = "" if result.ok else result.fall or result.reason
     return content, {"ok": result.ok, "reason": reason, **_accents(dance, heard)}
+
+
+def _shown(content: ReplayContent, dance: Dance, found: Beats, song: Path) -> ReplayContent:
+    """With the beats and the bars, the names of the moves on the strip, and the music."""
+    from controller.report_view import AFTERWARDS
+
+    run, bar = content.recording, (found.metre, found.downbeat)
+    moves = zip(run.labels, dance.named(run.time - run.time[0]), strict=True)
+    names = tuple(label if label == AFTERWARDS else move for label, move in moves)
+    return replace(
+        content,
+        recording=replace(run, labels=names),
+        beats=tuple(found.times.tolist()),
+        bar=bar if found.metre > 1 else content.bar,
+        sound=_music(song),
+    )
 
 
 def _music(song: Path) -> bytes:
@@ -114,6 +132,7 @@ def _told(song: Path, found: Beats, dance: Dance) -> dict[str, Any]:
         "song": str(song),
         "tempo": round(found.tempo, 2),
         "beats": len(found.times),
+        "metre": found.metre,
         "duration": round(found.duration, 3),
         "dance": dance.timeline.name,
         "feasible": True,
@@ -125,7 +144,8 @@ def _told(song: Path, found: Beats, dance: Dance) -> dict[str, Any]:
 
 
 def _print(told: dict[str, Any]) -> None:
-    print(f"{told['song']}: {told['beats']} beats, {told['tempo']:.0f} a minute")
+    bars = f", bars of {told['metre']}" if told["metre"] > 1 else ""
+    print(f"{told['song']}: {told['beats']} beats, {told['tempo']:.0f} a minute{bars}")
     print("-" * 80)
     for move in told["moves"]:
         print(f"  {move['time']:>7.2f} s  {move['name']}")

@@ -16,9 +16,9 @@ from jaxtyping import Int
 import viz  # what is named viz.X below is imported when something is drawn
 from controller.cli.common import ExitCode, print_json, shown_path
 from controller.cli.demo_table import render, render_steps
-from controller.cli.options import Mjcf, Numbers, reader, whole
+from controller.cli.options import Mjcf, Numbers, folder, reader, whole
 from controller.cli.progress import ProgressLine
-from go2_wbc.errors import ConfigError
+from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.files import checked_output, write_atomically
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ _positive = reader(float, lambda value: 0.0 < value < float("inf"), "a positive 
 class Output:
     """What a run leaves and shows."""
 
-    out: Annotated[Path, "DIR", "default: %(default)s"] = Path("out/demo")
+    out: Annotated[Path, "DIR", "default: %(default)s", folder] = Path("out/demo")
     no_media: Annotated[bool, "no page and no pictures"] = False
     json: Annotated[bool, "print JSON instead of the table"] = False
     viewer: Annotated[bool, "also open MuJoCo's window"] = False
@@ -103,6 +103,8 @@ def run(
         go2-wbc demo --backend placo --solver proxqp
         go2-wbc demo --ros2                  on the robot of `go2-wbc ros2 --realtime`
     """
+    if elsewhere.namespace != Elsewhere().namespace and not elsewhere.ros2:
+        raise CommandError("--namespace is that of a robot elsewhere: give --ros2, too")
     if elsewhere.ros2:
         return _run_over_ros(elsewhere.namespace, as_json=output.json)
     paths = checked_paths(output.out)  # before the run: its results must not be lost

@@ -21,7 +21,6 @@ def render(report: DemoReport, encoding: str | None = None) -> str:
     """The table of steps, the totals and the verdict.
 
     Args:
-        report: what was measured.
         encoding: of the terminal; ticks and crosses become words where it lacks them.
     """
     done = sum(step.ok for step in report.steps)

@@ -136,6 +136,7 @@ def examine() -> list[Finding]:
     probes = probe_imports({module for module in modules.values() if module} | ros2)
     findings = [
         judge_python(sys.version_info[:3], platform.platform()),
+        judge_system(sys.platform, platform.machine()),
         _judge_project(installed_version(PROGRAM)),
     ]
     for name, module in modules.items():
@@ -184,6 +185,17 @@ def judge_python(version: tuple[int, ...], system: str) -> Finding:
     detail = f"{name}: 3.11, 3.12 or 3.13 is needed"
     remedy = "make clean && make PYTHON=python3.12 demo"
     return Finding("Python", "python", Status.PROBLEM, detail, remedy)
+
+
+def judge_system(system: str, machine: str) -> Finding:
+    """Whether the project is tested on this system."""
+    if (system, machine) == ("linux", "x86_64"):
+        return Finding("Python", "system", Status.OK, "Linux on x86-64, which is tested")
+    if system == "win32":
+        detail = "Windows has no wheels of Pinocchio: work in WSL, which is a Linux"
+        return Finding("Python", "system", Status.PROBLEM, detail, "wsl --install")
+    name = {"darwin": "macOS", "linux": "Linux"}.get(system, system)
+    return Finding("Python", "system", Status.NOTE, f"untested on {name}, {machine}")
 
 
 def _judge_project(version: str | None) -> Finding:
@@ -282,7 +294,9 @@ def judge_extra(
 def judge_display(system: str, environment: Mapping[str, str]) -> Finding:
     """Whether ``--viewer`` can open a window; nothing else needs one."""
     found = next((v for v in ("WAYLAND_DISPLAY", "DISPLAY") if environment.get(v)), None)
-    if system in {"darwin", "win32"}:
+    if system == "darwin":
+        status, detail = Status.OK, 'with mjpython "$(command -v go2-wbc)" in place of go2-wbc'
+    elif system == "win32":
         status, detail = Status.OK, "this system has a desktop"
     elif found is not None:
         status, detail = Status.OK, f"possible, {found} is {environment[found]}"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from controller.cli.common import ExitCode, print_json
-from controller.cli.options import Json, output
+from controller.cli.options import Json, dds_domain, output
 from controller.cli.progress import ProgressLine
 from go2_wbc.errors import CommandError
 
@@ -21,7 +21,7 @@ def run(
     *,
     mjcf: Annotated[Path | None, "FILE", "an MJCF of your own"] = None,
     interface: Annotated[str | None, "NAME", "lo for a simulator"] = None,
-    domain: Annotated[int, "N", "0 robot, 1 simulator"] = 0,
+    domain: Annotated[int, "N", "0 robot, 1 simulator", dds_domain] = 0,
     i_have_the_remote_in_hand: Annotated[bool, "required with --interface"] = False,
     out: Annotated[Path | None, "FILE", "write the TOML there, too", output(".toml")] = None,
     json: Json = False,

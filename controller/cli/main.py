@@ -19,14 +19,19 @@ from dataclasses import dataclass
 
 from controller.cli.common import PROGRAM, ExitCode, Subparsers, examples_epilog, installed_version
 from controller.cli.options import add_command
+from controller.cli.progress import TRIES
+from controller.pacing import REASON
 from go2_wbc.errors import (
     CommandError,
     ConfigError,
     Go2WbcError,
     IkError,
+    ModelMismatch,
     MotionError,
+    MotionFileError,
     QpInfeasible,
     SolverUnavailable,
+    TimelineError,
 )
 
 
@@ -60,6 +65,7 @@ COMMANDS = tuple(
     for name, place, summary in (
         ("certify", "sweep:certify_command", "how often a motion is done in random worlds"),
         ("check", "motions:check", "can the robot do this motion?"),
+        ("completion", "completion", "what a shell needs to complete this on TAB"),
         ("dance", "dance", "a dance on the beats of a song"),
         ("demo", "demo", "stand, sit, walk, turn, high five; measured, in 3D"),
         ("doctor", "doctor", "check this installation, say what is missing"),
@@ -89,11 +95,12 @@ go2-wbc COMMAND --help   the options of a command, with examples
 """
 
 EXIT_CODES: tuple[tuple[tuple[type[Go2WbcError], ...], ExitCode], ...] = (
+    ((CommandError, ConfigError, SolverUnavailable, ModelMismatch), ExitCode.USAGE),
+    ((TimelineError, MotionFileError), ExitCode.USAGE),
     ((MotionError, QpInfeasible, IkError), ExitCode.FAILED),
-    ((CommandError, ConfigError, SolverUnavailable), ExitCode.USAGE),
     ((Go2WbcError,), ExitCode.RUNTIME),
 )
-"""The exit code of an error; the first row that fits counts."""
+"""The exit code of an error, of every command; the first row that fits counts."""
 
 _OURS = frozenset({"go2_wbc", "controller", "motions", "viz", "benchmarks"})
 
@@ -122,7 +129,7 @@ def run_program(program: Program, argv: Sequence[str] | None = None) -> int:
         argv: arguments without the program's name; by default those of the process.
 
     Returns:
-        0 fine, 1 infeasible or failed, 2 usage, 3 runtime error, 130 interrupted.
+        See ``ExitCode``.
     """
     try:
         try:
@@ -152,9 +159,12 @@ def _run(program: Program, argv: list[str]) -> int:
         args = parser.parse_args(argv)
     except SystemExit as stop:  # argparse has printed its help, version or complaint
         return stop.code if isinstance(stop.code, int) else ExitCode.USAGE
+    shown = logging.StreamHandler()
+    shown.addFilter(_is_news)
     logging.basicConfig(
         level=logging.INFO if args.verbose else logging.WARNING,
         format="%(levelname)s: %(message)s",
+        handlers=[shown],
     )
     if args.run is None:
         parser.print_help(sys.stderr)
@@ -162,10 +172,21 @@ def _run(program: Program, argv: list[str]) -> int:
     return args.run(args)
 
 
-def build_parser(program: Program, requested: str | None) -> argparse.ArgumentParser:
+def _is_news(record: logging.LogRecord) -> bool:
+    """Whether a log line says more than what commands print: outcomes, and what is tried."""
+    if record.name.startswith(f"{TRIES}."):
+        return record.levelno > logging.INFO or logging.getLogger().isEnabledFor(logging.INFO)
+    is_service = logging.getLogger(record.name).isEnabledFor(logging.INFO)  # or it is verbose
+    return is_service or record.msg != REASON
+
+
+def build_parser(
+    program: Program, requested: str | None, *, is_whole: bool = False
+) -> argparse.ArgumentParser:
     """The parser of a whole command line.
 
-    Only the ``requested`` subcommand is imported and adds its options; the others are listed.
+    Unless it ``is_whole``, only the ``requested`` subcommand is imported and adds its options; the
+    others are listed.
     """
     parser = argparse.ArgumentParser(
         prog=program.name,
@@ -181,7 +202,7 @@ def build_parser(program: Program, requested: str | None) -> argparse.ArgumentPa
     parser.set_defaults(run=None)
     subparsers = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND")
     for command in program.commands:
-        if command.name == requested:
+        if is_whole or command.name == requested:
             command.add_to(subparsers)
         else:
             subparsers.add_parser(command.name, help=command.summary)

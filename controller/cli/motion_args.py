@@ -86,8 +86,10 @@ def motions_of(word: str) -> list[Motion]:
 
 def print_verdict(report: FeasibilityReport) -> None:
     """Print a line about a motion, and one for each limit that it breaks."""
-    lines = [report.summary(), *(f"     {finding}" for finding in report.failures)]
-    print("\n".join(lines), flush=True)
+    broken = [f"     {finding}" for finding in report.failures]
+    number = f"{len(broken)} limit{'' if len(broken) == 1 else 's'} broken"
+    head = report.summary() if report.ok else f"no   {report.motion:<15} {number}"
+    print("\n".join([head, *broken]), flush=True)
 
 
 def checker_of(config: Config, world: World, line: ProgressLine) -> FeasibilityChecker:

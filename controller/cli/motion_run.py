@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
-from dataclasses import replace
+from contextlib import closing, contextmanager, nullcontext
+from dataclasses import dataclass, replace
 from itertools import count
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import viz
 from controller.cli.common import ExitCode, print_json, shown_path
 from controller.cli.motion_args import (
     Friction,
@@ -18,9 +20,11 @@ from controller.cli.motion_args import (
     checker_of,
     the_motion,
 )
-from controller.cli.options import Html, Json, Numbers
+from controller.cli.motion_preview import VIDEO_RATE
+from controller.cli.options import Html, Json, Mjcf, Numbers, output, video_file, whole
 from controller.cli.progress import ProgressLine
-from go2_wbc.errors import PlantError, StanceMismatch
+from controller.modes import Mode
+from go2_wbc.errors import ConfigError, PlantError, StanceMismatch
 
 if TYPE_CHECKING:
     from controller.go2_controller import GO2Controller
@@ -29,12 +33,37 @@ if TYPE_CHECKING:
     from go2_wbc.motion_plan import MotionPlan
     from go2_wbc.plant import MujocoPlant
     from go2_wbc.plant.mujoco.ground_truth import GroundTruth
+    from go2_wbc.recording import Recording
+    from go2_wbc.robot.model import RobotModel
     from go2_wbc.world import World
+    from motions import CheckedMotion
 
 TELL_EVERY = 50
 """Ticks between two looks at the progress line."""
 GETTING_READY = 2.5
 """About how long [s] the robot takes to stand up before the motion."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """Where it is played, and whether one looks on."""
+
+    mjcf: Mjcf = None
+    keyframe: Annotated[str | None, "NAME", "of the scene: begin there, not lying"] = None
+    viewer: Annotated[bool, "also open MuJoCo's window, at the pace of the wall clock"] = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Files:
+    """What is written; None for what is not."""
+
+    html: Annotated[Html, "write a 3D replay page, the plan as a ghost"] = None
+    video: Annotated[Path | None, "FILE", "an animation; ends in .webp or .gif", video_file] = None
+    export: Annotated[
+        Path | None,
+        *("FILE", "the recording; .npz, .mcap for Foxglove or .rrd for Rerun"),
+        output(".npz", ".mcap", ".rrd"),
+    ] = None
 
 
 def run(
@@ -45,9 +74,10 @@ def run(
     friction: Friction = None,
     payload: Payload = None,
     sensors: Sensors = "ideal",
-    seed: Annotated[int, "N", "of sensors and of what the world leaves open"] = 0,
+    seed: Annotated[int, "N", "of sensors and of what the world leaves open", whole] = 0,
     config: Numbers = None,
-    html: Annotated[Html, "write a 3D replay page, the plan as a ghost"] = None,
+    scene: Annotated[Scene, "scene"],
+    files: Annotated[Files, "files"],
     json: Json = False,
 ) -> int:
     """Check a motion, then play it in MuJoCo under the whole-body controller.
@@ -60,16 +90,24 @@ def run(
         go2-wbc run wave --set side=left --html wave.html
         go2-wbc run my_motion.py --friction 0.5 --sensors imu --seed 3
         go2-wbc run my_motion.py --force    although the check says no
+        go2-wbc run wave --viewer --video wave.webp --export wave.mcap
+        go2-wbc run wave --mjcf yard.xml --keyframe ramp    of `new yard --scene`
     """
     from controller.arguments import config as read_config
     from controller.motion_measurement import measure_motion
-    from controller.report_view import performed
     from go2_wbc.plant import plant_in_world
+    from go2_wbc.recording import EXPORTS, viewer
     from go2_wbc.world import World
-    from viz import export_html
 
+    if scene.keyframe is not None and scene.mjcf is None:
+        raise ConfigError("--keyframe names one of a scene: give its file, too, by --mjcf")
+    if files.export is not None and (extra := EXPORTS.get(files.export.suffix)):
+        viewer(extra)  # what is missing is told before the work
     meant, numbers = the_motion(motion, set), read_config(config)
     world = replace(World.of(friction, payload), sensors=sensors)
+    plant = plant_in_world(
+        world, seed=seed, mjcf=scene.mjcf, keyframe=scene.keyframe, visuals=scene.viewer
+    )
     with ProgressLine(is_quiet=json) as line:
         line.update(0.0, f"checking {meant.name}")
         checker = checker_of(numbers, world, line)
@@ -77,7 +115,7 @@ def run(
     plan, report = checked.plan, checked.report
     if not force:
         report.raise_if_infeasible()
-    with getting_ready(plan, plant_in_world(world, seed=seed), line, numbers) as (go2, truth):
+    with getting_ready(plan, plant, line, numbers, viewer=scene.viewer) as (go2, truth):
         result = measure_motion(go2, truth, plan, checker.model)
         recording = go2.recording()
     if json:
@@ -85,30 +123,74 @@ def run(
         print_json({"motion": plan.name, "feasible": report.ok, **where, **result.as_dict()})
     else:
         _print(plan.name, plan.duration, world, result)
-    if html is not None:
-        export_html(performed(checked, recording, checker.model), html, title=plan.name)
-        if not json:
-            print(f"3D replay beside the plan, offline: {shown_path(html)}")
+    _write(files, recording, checked, checker.model, is_quiet=json)
     return ExitCode.OK if result.ok else ExitCode.FAILED
+
+
+def _write(
+    files: Files, recording: Recording, checked: CheckedMotion, model: RobotModel, *, is_quiet: bool
+) -> None:
+    """Write what was asked for, and say where it is."""
+    from controller.report_view import performed
+
+    told: list[tuple[str, Path]] = []
+    if files.export is not None:
+        to_own = files.export.suffix == ".npz"
+        path = recording.save(files.export) if to_own else recording.export(files.export)
+        told.append(("recording", path))
+    if files.html is not None or files.video is not None:
+        content, name = performed(checked, recording, model), checked.plan.name
+        if files.html is not None:
+            path = viz.export_html(content, files.html, title=name)
+            told.append(("3D replay beside the plan, offline", path))
+        if files.video is not None:
+            with ProgressLine(is_quiet=is_quiet) as line:
+                path = viz.export_animation(
+                    content,
+                    files.video,
+                    speed=1.0,
+                    fps=VIDEO_RATE,
+                    progress=lambda share: line.update(share, f"drawing {name}"),
+                )
+            told.append(("animation", path))
+    for what, path in [] if is_quiet else told:
+        print(f"{what}: {shown_path(path)}")
 
 
 @contextmanager
 def getting_ready(
-    plan: MotionPlan, plant: MujocoPlant, line: ProgressLine, config: Config | None = None
+    plan: MotionPlan,
+    plant: MujocoPlant,
+    line: ProgressLine,
+    config: Config | None = None,
+    *,
+    viewer: bool = False,
 ) -> Iterator[tuple[GO2Controller, GroundTruth]]:
     """A robot that has got ready for a plan, with the truth; ``line`` tells how far it has come.
+
+    With ``viewer`` MuJoCo's window shows it, at the pace of the wall clock, if there is a display.
 
     Raises:
         StanceMismatch: for a plan that starts otherwise than standing or sitting.
         PlantError: if the robot does not get ready.
     """
     from controller.go2_controller import GO2Controller
+    from controller.pacing import Pacer
+    from controller.runner import GREATEST_LAG
     from go2_wbc.motion_plan import Posture
     from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 
-    ticks = count(1)
+    ticks, window = count(1), None
+    if viewer:
+        from go2_wbc.plant.mujoco.viewer import open_viewer  # MuJoCo's window with it
+
+        window = open_viewer(plant)
+    pacer = Pacer(plant.control_period, GREATEST_LAG)
 
     def tell() -> None:
+        if window is not None:
+            window.show(plant.time)
+            pacer.wait()
         if (tick := next(ticks)) % TELL_EVERY == 0:
             time = tick * truth.control_period
             share = min(time / (GETTING_READY + plan.duration), 1.0)
@@ -116,6 +198,7 @@ def getting_ready(
 
     with (
         line,
+        nullcontext() if window is None else closing(window),
         closing(GroundTruth(plant)) as truth,
         GO2Controller(plant=truth, config=config) as go2,
     ):
@@ -123,7 +206,8 @@ def getting_ready(
         starts = {Posture.STAND: go2.stand, Posture.SIT: go2.sit}
         if plan.entry not in starts:
             raise StanceMismatch(f"{plan.name} starts from {plan.entry.value}: cannot be run")
-        if not starts[plan.entry]() or truth.fall():
+        stands = go2.mode is Mode.LYING or go2.take_over()
+        if not (stands and starts[plan.entry]()) or truth.fall():
             reason = truth.fall() or go2.last_outcome.reason
             raise PlantError(f"the robot did not get ready: {reason}")
         yield go2, truth

@@ -27,7 +27,7 @@ from controller.cli.motion_args import (
     print_verdict,
     the_motion,
 )
-from controller.cli.options import Json, Numbers, output
+from controller.cli.options import Json, Numbers, folder, output
 from controller.cli.progress import ProgressLine
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.files import checked_output, write_atomically
@@ -105,30 +105,56 @@ def _parameters(motion: Motion) -> dict[str, object]:
 def new(
     name: Annotated[str, "NAME", "of the motion and its file"],
     *,
-    out: Annotated[Path, "DIR", "default: here"] = Path(),
+    scene: Annotated[
+        bool, "a scene instead: MJCF with a box on its back, a ramp, keyframes"
+    ] = False,
+    out: Annotated[Path, "DIR", "default: here", folder] = Path(),
     json: Json = False,
 ) -> int:
-    """Write a small, commented motion to start from.
+    """Write a small, commented motion, or a scene for MuJoCo, to start from.
 
     Examples:
         go2-wbc new greet            writes greet.py
         go2-wbc new greet --out motions_of_mine
+        go2-wbc new yard --scene     writes yard.xml, for run and demo --mjcf
     """
     if not name.isidentifier() or keyword.iskeyword(name):
         raise CommandError(f"NAME must be a Python name such as my_motion, got {name!r}")
-    if name in sys.stdlib_module_names or find_spec(name) is not None:
+    if not scene and (name in sys.stdlib_module_names or find_spec(name) is not None):
         raise CommandError(f"{name}.py would hide the module {name!r}: choose another name")
-    shown = out / f"{name}.py"
-    target = checked_output(shown, [".py"])
+    suffix = ".xml" if scene else ".py"
+    shown = out / f"{name}{suffix}"
+    target = checked_output(shown, [suffix])
     if target.exists():
         raise ConfigError(f"{shown} exists already: choose another name")
     title = name.replace("_", " ").capitalize()
-    write_atomically(target, STARTER.format(name=name, title=title).encode())
+    text = _scene() if scene else STARTER.format(name=name, title=title)
+    write_atomically(target, text.encode())
     if json:
-        print_json({"motion": name, "file": str(target)})
+        print_json({"scene" if scene else "motion": name, "file": str(target)})
     else:
-        print(f"wrote {shown}; now: go2-wbc check {shown}")
+        then = f"run wave --mjcf {shown} --keyframe ramp" if scene else f"check {shown}"
+        print(f"wrote {shown}; now: go2-wbc {then}")
     return ExitCode.OK
+
+
+def _scene() -> str:
+    """MJCF in which the robot may stand on the floor and on the ramp."""
+    from go2_wbc.plant.mujoco.scene import RAMP_MIDDLE, RAMP_PITCH, starter_scene
+    from go2_wbc.robot.model import RobotModel
+    from go2_wbc.robot.rotations import quaternion_from_rpy, rotation_from_rpy
+    from motions.postures import standing_feet, standing_on
+
+    model, stances = RobotModel(), {}
+    for stance, place, pitch in (
+        ("floor", (0.0, 0.0, 0.0), 0.0),
+        ("ramp", RAMP_MIDDLE, -RAMP_PITCH),
+    ):
+        R, p_com = rotation_from_rpy(0.0, pitch, 0.0), [0.0, 0.0, model.profile.stand_height]
+        feet = standing_feet(model) @ R.T + place
+        p_base, q_joints = standing_on(feet, np.add(place, p_com), R, model)
+        stances[stance] = np.concatenate([p_base, quaternion_from_rpy(0.0, pitch, 0.0), q_joints])
+    return starter_scene(stances)
 
 
 # --- check ----------------------------------------------------------------------------------------
@@ -172,7 +198,7 @@ def check(
             progress.update(number / len(lines), line.name)
             reports.append(checker.check(line))
             if fix and not reports[-1].ok:
-                progress.update((number + 0.5) / len(lines), f"{line.name}: changes")
+                progress.update((number + 0.5) / len(lines), f"{line.name}, changes")
                 changes[line.name] = suggest(line, checker=checker)
     if json:
         print_json([_report(report, changes) for report in reports])
@@ -199,7 +225,7 @@ def _print_reports(
 def _print_changes(name: str, found: Sequence[Suggestion]) -> None:
     """What to append to the motion ``name`` to make it feasible, the least change first."""
     if not found:
-        print(f"\n{name}: no change of tempo, size, height or shift time makes it feasible.")
+        print(f"\n{name}: no change of tempo, size, height, shifts or jumps makes it feasible.")
         return
     print(f"\n{name} is feasible with one of these appended, the least change first:")
     for one in found:

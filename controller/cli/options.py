@@ -116,6 +116,13 @@ def reader(
     return read
 
 
+def folder(text: str) -> Path:
+    """The folder of this name."""
+    if not text:
+        raise argparse.ArgumentTypeError("must be a folder, got ''")
+    return Path(text)
+
+
 def output(*suffixes: str) -> Callable[[str], Path]:
     """What makes of a text a file that can be written, or raises ConfigError."""
     return lambda text: checked_output(text, suffixes)
@@ -127,7 +134,8 @@ def drawing(kind: str) -> Callable[[str], Path]:
 
 
 page_file, plot_file, video_file = drawing("HTML"), drawing("PLOT"), drawing("ANIMATION")
-whole = reader(int, lambda value: value >= 0, "a whole number of 0 or more")
+whole = reader(int, lambda value: 0 <= value < 2**63, "a whole number of 0 or more")
+dds_domain = reader(int, lambda value: 0 <= value <= 232, "a domain of DDS, 0 to 232")
 Json = Annotated[bool, "print JSON"]
 Html = Annotated[Path | None, "FILE", "write a 3D replay page", page_file]
 Numbers = Annotated[Path | None, "FILE", "TOML with other numbers"]

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 import shutil
 import sys
 
 BAR_WIDTH = 20
 TELL_EVERY = 5
 """Iterations of a solver from one look at the line to the next: some ten times a second."""
+TRIES = "motions"
+"""Whose log lines of the level INFO say what is tried; they are shown as progress."""
+_LOG = logging.getLogger(TRIES)
 _CLEAR = "\r\x1b[2K"
 
 
@@ -23,6 +27,8 @@ class ProgressLine:
         self._is_live = sys.stderr.isatty() and not is_quiet
         self._is_quiet = is_quiet
         self._share, self._text = 0.0, ""
+        self._told = logging.Handler()
+        self._told.emit = self._tell
 
     def update(self, share: float, text: str) -> None:
         """Show that ``share`` (0 to 1) is finished and ``text`` is going on."""
@@ -41,6 +47,12 @@ class ProgressLine:
         if iterations % TELL_EVERY == 1:
             self._show(f"{self._text}: solving, iteration {iterations}, cost {cost:.3g}")
 
+    def _tell(self, record: logging.LogRecord) -> None:
+        """Show what a search tries or has found out."""
+        if record.levelno == logging.INFO:
+            self.done(f"{self._text}: {record.getMessage()}")
+            self._show(f"{self._text}: {record.getMessage()}")
+
     def _show(self, text: str) -> None:
         if self._is_live:
             shown = f"{progress_bar(self._share)} {text}"[: shutil.get_terminal_size().columns - 1]
@@ -52,9 +64,15 @@ class ProgressLine:
             print(text, file=sys.stderr, flush=True)
 
     def __enter__(self) -> ProgressLine:
+        if not _LOG.isEnabledFor(logging.INFO):  # else it is shown already
+            _LOG.addHandler(self._told)
+            _LOG.setLevel(logging.INFO)
         return self
 
     def __exit__(self, *_: object) -> None:
+        if self._told in _LOG.handlers:
+            _LOG.removeHandler(self._told)
+            _LOG.setLevel(logging.NOTSET)
         if self._is_live:
             print(_CLEAR, end="", file=sys.stderr, flush=True)
 

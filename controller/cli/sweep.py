@@ -48,6 +48,7 @@ def sweep_command(
     set: Settings = (),
     export: Annotated[tuple[Path, ...], "FILE", ".csv or .parquet"] = (),
     plot: Annotated[Path | None, "FILE", ".svg, .png or .pdf", plot_file] = None,
+    over: Annotated[tuple[str, ...], "NAME", "columns that --plot draws it over, one or two"] = (),
     json: Json = False,
 ) -> int:
     """Run something over many seeds, and keep every row in an SQLite file as it is finished.
@@ -59,6 +60,7 @@ def sweep_command(
     Examples:
         go2-wbc sweep high_five --n 200
         go2-wbc sweep gait:trot@0.5 --n 100 --workers 2 --plot trot.svg
+        go2-wbc sweep bow --n 300 --plot bow.svg --over friction mass_scale
         go2-wbc sweep push:12 --n 300 --export pushes.csv
         go2-wbc sweep my_study.py:trial --n 1000 --out study.sqlite
         go2-wbc sweep my_study.py:trial --n 9000 --engine ray --address auto
@@ -68,6 +70,8 @@ def sweep_command(
     from controller.sweeps.summary import summarise
     from controller.sweeps.targets import motion_target
 
+    if over and plot is None:
+        raise CommandError("--over says what --plot draws: give --plot FILE, too")
     for path in export:
         require_exporter(path)
     with ProgressLine() as line:
@@ -78,7 +82,7 @@ def sweep_command(
     summary = summarise(result.rows, result.columns)
     written = [export_rows(result, path) for path in export]
     if plot is not None:
-        written.append(_plot(result, summary, plot))
+        written.append(_plot(result, summary, plot, over))
     if json:
         print_json(_as_dict(result, summary, written))
     else:
@@ -108,13 +112,18 @@ def _duration(seconds: float) -> str:
     return f"{seconds:.0f} s"
 
 
-def _plot(result: SweepResult, summary: Summary, path: Path) -> Path:
-    from viz import export_distributions
+def _plot(result: SweepResult, summary: Summary, path: Path, over: tuple[str, ...]) -> Path:
+    """The outcomes over what was varied; how each is spread, where that is not known."""
+    from controller.sweeps.relation import relations
+    from viz import export_distributions, export_relations
 
+    title = f"{result.name}, {summary.n} seeds"
+    found = relations(result.rows, result.columns, over)
+    if found:
+        return export_relations(found, path, title=title)
     values = {name: [row[name] for row in result.rows] for name in result.columns}
     numbers = {item.name: [float(v) for v in values[item.name]] for item in summary.spreads}
     rates = {item.name: (item.rate, item.low, item.high) for item in summary.rates}
-    title = f"{result.name}, {summary.n} seeds"
     return export_distributions(numbers, rates, path, title=title)
 
 

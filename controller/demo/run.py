@@ -51,7 +51,6 @@ def run_demo(
     Args:
         go2: the robot; any plant, any configuration, lying or standing.
         on_progress: is told when a step begins and when it has ended.
-        steps: what to do.
 
     Raises:
         PlantError: if the plant fails.

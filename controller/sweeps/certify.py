@@ -21,6 +21,7 @@ from controller.sweeps.rows import SEED, Row
 from controller.sweeps.run import Progress, SweepResult, read_sweep, sweep
 from controller.sweeps.summary import CONFIDENCE, finite, rate_interval
 from controller.sweeps.targets import motion_target
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.errors import CommandError
 from go2_wbc.world import World
@@ -106,6 +107,7 @@ class Certificate:
         }
 
 
+@typed(error=CommandError)
 def certify(
     motion: object,
     n: int = RUNS,

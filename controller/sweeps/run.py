@@ -16,6 +16,7 @@ from controller.sweeps.local import LocalEngine, processors
 from controller.sweeps.rows import SEED, Columns, Row
 from controller.sweeps.sweep_file import SweepFile
 from controller.sweeps.targets import target_of
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief, inline_html
 from go2_wbc.errors import CommandError, SweepError, unknown_name
 
@@ -75,6 +76,7 @@ class SweepResult:
     __repr__ = brief
 
 
+@typed(error=CommandError)
 def sweep(
     what: object,
     n: int = 1000,

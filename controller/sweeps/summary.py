@@ -124,6 +124,17 @@ def rate_interval(count: int, n: int, confidence: float = CONFIDENCE) -> tuple[f
     return low, high
 
 
+def mean_interval(values: np.ndarray) -> tuple[float, float]:
+    """95 % interval of the true mean (Student's t); nan for fewer than two values."""
+    from scipy.stats import t
+
+    mean, half = float(values.mean()), math.nan
+    if len(values) > 1:
+        quantile = float(t.ppf(0.5 + 0.5 * CONFIDENCE, len(values) - 1))
+        half = quantile * float(values.std(ddof=1)) / math.sqrt(len(values))
+    return mean - half, mean + half
+
+
 def _rate(name: str, values: list) -> Rate:
     count = sum(values)
     return Rate(name, len(values), count, *rate_interval(count, len(values)))
@@ -135,18 +146,13 @@ def _spread(name: str, values: np.ndarray) -> Spread:
     if not len(known):
         nan = math.nan
         return Spread(name, 0, nan, nan, nan, nan, nan, (nan,) * len(PERCENTILES))
-    mean, half = float(known.mean()), math.nan
-    if len(known) > 1:
-        from scipy.stats import t
-
-        quantile = float(t.ppf(0.5 + 0.5 * CONFIDENCE, len(known) - 1))
-        half = quantile * float(known.std(ddof=1)) / math.sqrt(len(known))
+    low, high = mean_interval(known)
     return Spread(
         name=name,
         n=len(known),
-        mean=mean,
-        low=mean - half,
-        high=mean + half,
+        mean=float(known.mean()),
+        low=low,
+        high=high,
         least=float(known[0]),
         most=float(known[-1]),
         percentiles=tuple(np.percentile(known, PERCENTILES).tolist()),

@@ -1,6 +1,7 @@
 """The parts of the reference that the code itself says.
 
-- Before a build, a page for every room of the packages, from its docstrings, in ``reference/api``.
+- Before a build, from the docstrings: in ``reference/api`` a page for what each package offers, in
+  ``reference/api/internals`` one for every room of the packages, with all the rest.
 - ``{cli-help} NAME``: what ``go2-wbc NAME --help`` prints.
 - ``{examples}``: the scripts of ``examples/``.
 - ``{config-table} MODULE.CLASS``: the fields of a configuration with default and meaning.
@@ -15,7 +16,7 @@ import dataclasses
 import inspect
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
 from unittest import mock
@@ -32,6 +33,8 @@ from go2_wbc.wbc.config import Gains
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("go2_wbc", "motions", "viz", "controller")
+OFFERED = (*PACKAGES, "motions.music")
+"""Packages whose public names programs use; of those that two of them offer the first one tells."""
 LEFT_OUT = ("controller/cli", "controller/bridges", "motions/library")
 """Described on other pages: the command line, ROS 2 and Unitree, the gallery."""
 _FIELD = re.compile(r"^    ([a-z]\w*(?:, [a-z]\w*)*): (.*(?:\n {5,}.*)*)", re.MULTILINE)
@@ -59,14 +62,48 @@ def _important_first(page: str, modules: list[str], root: Path) -> list[str]:
     return sorted(modules, key=lambda name: (name != page, name not in homes))
 
 
+def offered(root: Path = ROOT) -> dict[str, dict[str, str]]:
+    """The public names on the page of each package, and the module that each is defined in."""
+    found: dict[str, dict[str, str]] = {}
+    told: set[tuple[str, str]] = set()
+    for package in OFFERED:
+        own = exports_of(package, root)
+        found[package] = dict(item for item in own.items() if item not in told)
+        told |= found[package].items()
+    return found
+
+
+def user_page(package: str, names: Mapping[str, str], root: Path = ROOT) -> str:
+    """What a package offers, in MyST."""
+    lines = [f"# {package}", "", *_package(package, root), "```{eval-rst}"]
+    for name, home in names.items():
+        kind = _directive(name, home, root)
+        members = ["   :members:"] * (kind == "autoclass")
+        lines += [f".. {kind}:: {home}.{name}", *members, ""]
+    return "\n".join([*lines, "```", ""])
+
+
+def _directive(name: str, home: str, root: Path) -> str:
+    """How Sphinx is asked for a name of a module."""
+    file = root.joinpath(*home.split("."))
+    file = file / "__init__.py" if file.is_dir() else file.with_suffix(".py")
+    for node in ast.parse(file.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ClassDef | ast.FunctionDef) and node.name == name:
+            return "autoclass" if isinstance(node, ast.ClassDef) else "autofunction"
+    return "autodata"
+
+
 def api_page(room: str, modules: list[str], root: Path = ROOT) -> str:
-    """A page of the API reference in MyST."""
-    lines = [f"# {room}", ""]
+    """A page of the API reference in MyST, without what programs use."""
+    lines = [f"# {room}, inside", ""]
+    used = {(home, name) for names in offered(root).values() for name, home in names.items()}
     for name in modules:
         if (root / name.replace(".", "/")).is_dir():
             lines += [*([f"## {name}", ""] * (name != room)), *_package(name, root)]
         else:
             lines += [f"## {name}", "", "```{eval-rst}", f".. automodule:: {name}", "   :members:"]
+            elsewhere = sorted(other for home, other in used if home == name)
+            lines += [*([f"   :exclude-members: {', '.join(elsewhere)}"] * bool(elsewhere))]
             lines += ["```", ""]
     return "\n".join(lines)
 
@@ -99,10 +136,11 @@ def _package(name: str, root: Path) -> Iterator[str]:
 def write_api_pages(app: Sphinx) -> None:
     """Write the pages that have changed, and remove those without a room."""
     folder = Path(app.srcdir, "reference", "api")
-    folder.mkdir(exist_ok=True)
-    pages = {f"{room}.md": api_page(room, modules) for room, modules in rooms().items()}
-    for file in folder.glob("*.md"):
-        if file.name not in pages:
+    (folder / "internals").mkdir(parents=True, exist_ok=True)
+    pages = {f"internals/{room}.md": api_page(room, modules) for room, modules in rooms().items()}
+    pages |= {f"{package}.md": user_page(package, names) for package, names in offered().items()}
+    for file in folder.rglob("*.md"):
+        if file.relative_to(folder).as_posix() not in pages:
             file.unlink()
     for name, text in pages.items():
         file = folder / name

@@ -144,12 +144,6 @@ def quaternion_of(R: Array3x3, q: Array4) -> None:
     q /= np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
 
 
-@subroutine
-def angle_between(a: V3, b: V3) -> float:
-    """Angle [rad] between two vectors of length 1."""
-    return np.arccos(min(max(dot(a, b), -1.0), 1.0))
-
-
 Vector = Float[np.ndarray, " n"]
 Square = Float[np.ndarray, "n n"]
 DEFINITE = 1e-14

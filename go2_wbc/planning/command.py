@@ -12,6 +12,9 @@ from go2_wbc.validation import POSITIVE, ranged
 ROUNDING = 1e-12
 """Share of the envelope by which a command on its surface may seem to lie outside."""
 
+FAR = 2.0
+"""How many times the envelope from which on other units may be meant."""
+
 
 def finite_number(name: str, value: float) -> float:
     """``value`` as a float; raise CommandError if it is not a finite number."""
@@ -89,6 +92,22 @@ class VelocityEnvelope:
         if load * scale <= 1.0 + ROUNDING:
             return command
         return VelocityCommand(x / load, y / load, turn / load)
+
+    def excess(self, command: VelocityCommand) -> str:
+        """What there is to say of a command that lies outside, or nothing."""
+        if (followed := self.clip(command)) == command:
+            return ""
+        told = f"velocity command clipped from {command} to {followed}"
+        if self.is_far(command):
+            told += (
+                f", which asks for {self.load(command):.3g} times what is followed: speeds are in "
+                "m/s, turning rates in rad/s"
+            )
+        return told
+
+    def is_far(self, command: VelocityCommand) -> bool:
+        """Whether ``command`` is so far outside that other units may be meant."""
+        return self.load(command) > FAR
 
     def load(self, command: VelocityCommand) -> float:
         """Share of the envelope that ``command`` uses: 1 on its surface."""

@@ -11,7 +11,8 @@ known. The estimate begins low there (``LocomotionConfig.ground_friction``), and
 and nothing slides: a walk that began with 0.6 slid at once on a friction of 0.2, and where commands
 act 10 ms late as well it fell in its first second. With 0.35 it fell on its own sensors; with 0.2
 it follows a curve as it begins by 0.03 m/s less exactly than with 0.6, and withstands the same
-pushes.
+pushes. A robot that stands on the feet of one side, or of one end, pushes along the ground or tips
+over: until a foot has slid it counts on ``MOST_FRICTION``.
 
 A foot that carries load and slides has less friction than it was counted on. While one does, the
 estimate falls towards what that foot shows, and otherwise it recovers, slowly:
@@ -314,9 +315,12 @@ class Slip(Record):
         friction: the estimate.
         loaded: time [s] for which each foot has stood.
         sliding: time [s] for which it has slid.
+        has_slid: whether a foot has, and has shown less than the greatest estimate, since that
+            was the estimate.
     """
 
     friction: float
+    has_slid: bool
     loaded: Float[np.ndarray, "4"]
     sliding: Float[np.ndarray, "4"]
 
@@ -347,12 +351,15 @@ def observe_slip(
     tau: Foreign[Float[np.ndarray, "12"]],
     stance: Bool[np.ndarray, "4"],
     is_stepping: bool,
+    stands_beside_com: bool,
     dt: float,
 ) -> None:
     """Look at the feet that shall stand, ``dt`` seconds after the last look.
 
     ``contact`` are the feet in measured contact, ``tau`` [N m] the measured torques.
     """
+    if stands_beside_com and not slip.has_slid:
+        slip.friction = MOST_FRICTION
     slips, shown = False, MOST_FRICTION
     for leg in range(4):
         v_x, v_y, v_z = triple(now.v_world_contacts[leg])
@@ -371,7 +378,9 @@ def observe_slip(
             ratio = exerted_ratio(now, tau, leg)
             shown = min(shown, ratio / (1.0 + speed / HALF_SPEED))
     if slips:
+        slip.has_slid = slip.has_slid or shown < MOST_FRICTION
         fall = min(max(shown, LEAST_FRICTION) - slip.friction, 0.0)
         slip.friction += fall * min(dt / FRICTION_FALL_TIME, 1.0)
     elif is_stepping:
         slip.friction = min(slip.friction + FRICTION_RISE * dt, MOST_FRICTION)
+        slip.has_slid = slip.has_slid and slip.friction < MOST_FRICTION

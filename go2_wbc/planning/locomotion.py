@@ -16,8 +16,10 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.contacts import TIE, Gait
+from go2_wbc.errors import CommandError
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.footholds import foothold, nominal_feet
 from go2_wbc.planning.force_mpc import apply_force_plan
@@ -230,7 +232,8 @@ def plan(
         foot, p = s.feet[leg].contact, now.p_world_feet[leg]
         above = p[2] - c.foot_radius - ground_at(s.ground, p[0], p[1])
         stands[leg] = follow_contact(foot, above, contact[leg], stance[leg], progress[leg], dt)
-    observe_slip(s.slip, now, contact, tau, stands, s.is_stepping, dt)
+    steps, beside = s.is_stepping, c.stands_beside_com
+    observe_slip(s.slip, now, contact, tau, stands, steps, beside, dt)
     note_liftoffs(now, s, c, contact, stance, progress)
     target.friction = level_friction(s.ground, s.slip.friction, LEAST_FRICTION)
     fill_body(s.trunk, s.ground, c.height, target)
@@ -244,20 +247,30 @@ def plan(
 class LocomotionPlanner:
     """Turns a velocity command into references, one tick after the other."""
 
+    @typed()
     def __init__(self, model: RobotModel, gait: Gait, config: LocomotionConfig) -> None:
         """Prepare a planner; ``start`` sets it on its way."""
         self._model, self._config = model, config
         self._state, self._command = Planner(), Command()
         self.change_gait(gait)
 
-    def start(self, snapshot: Snapshot, friction: float | None = None) -> None:
+    @typed()
+    def start(
+        self, snapshot: Snapshot, friction: float | None = None, has_slid: bool = True
+    ) -> None:
         """Begin from the measured state, standing.
 
         Args:
             snapshot: of this tick.
             friction: of the ground, as it is known; None if nothing is.
+            has_slid: whether a foot has shown that, and not only that it is at least as high.
+
+        Raises:
+            CommandError: for a friction of 0 or less.
         """
         known = self._config.ground_friction if friction is None else friction
+        if known <= 0.0:
+            raise CommandError(f"friction must be above 0, got {friction}")
         feet = [
             Foot(
                 contact=FootContact(since=np.inf, was_stance=True),
@@ -270,12 +283,15 @@ class LocomotionPlanner:
             trunk=Trunk(yaw=snapshot.state.yaw, position=snapshot.p_world_com[:2]),
             rest=Rest(place=snapshot.p_world_com[:2], middle=snapshot.p_world_feet.mean(axis=0)),
             ground=ground_below(snapshot, self._model.foot_radius),
-            slip=Slip(friction=min(known, MOST_FRICTION)),
+            slip=Slip(
+                friction=min(known, MOST_FRICTION), has_slid=friction is not None and has_slid
+            ),
             feet=feet,
             planned=PlannedForces(next=-np.inf),
         )
         restart(self._state.clock, self._walk.cadence)
 
+    @typed()
     def change_gait(self, gait: Gait) -> None:
         """Walk on with ``gait``; while it walks the strides pass over into it one after the other.
 
@@ -311,6 +327,12 @@ class LocomotionPlanner:
         """Of the ground, as far as it has been shown; 0 before ``start``."""
         return float(self._state.slip.friction)
 
+    @property
+    def has_slid(self) -> bool:
+        """Whether a foot has, and has shown that friction."""
+        return bool(self._state.slip.has_slid)
+
+    @typed(late=True)
     def square_up(self, snapshot: Snapshot) -> bool:
         """Start stepping unless every foot is below its hip; returns whether they all are."""
         is_done = bool(is_square(snapshot, self._state, self._walk))
@@ -322,6 +344,7 @@ class LocomotionPlanner:
         """Why a robot without a command has not come to rest, in plain words; "" if it has."""
         return why_not_resting(snapshot, self._state, self._walk)
 
+    @typed(late=True)
     def update(
         self, snapshot: Snapshot, command: VelocityCommand, pose: BodyPose = LEVEL
     ) -> Reference:

@@ -110,8 +110,8 @@ class PoseEnvelope:
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a lowest trunk that is above the usual one."""
-        if not -np.inf < self.lowest <= 0.0:
-            raise ConfigError(f"PoseEnvelope.lowest must be 0 or below, got {self.lowest!r}")
+        if not -1.0 <= self.lowest <= 0.0:
+            raise ConfigError(f"PoseEnvelope.lowest must be between -1 and 0, got {self.lowest!r}")
 
     def bounds(self, name: str) -> tuple[float, float]:
         """Least and greatest value of a component of the pose."""

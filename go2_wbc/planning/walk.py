@@ -139,6 +139,7 @@ class Walk:
         gravity: [m/s^2].
         foot_radius: [m].
         p_base_feet_nominal: places of the feet below the hips, from the base [m].
+        stands_beside_com: whether at times only the feet of one side, or of one end, stand.
     """
 
     config: LocomotionConfig
@@ -148,6 +149,7 @@ class Walk:
     gravity: float
     foot_radius: float
     p_base_feet_nominal: Float[np.ndarray, "4 3"]
+    stands_beside_com: bool
 
     @staticmethod
     def of(model: RobotModel, gait: Gait, config: LocomotionConfig) -> Walk:
@@ -160,6 +162,7 @@ class Walk:
             model.gravity,
             model.foot_radius,
             model.p_base_feet_nominal,
+            gait.stands_beside_com,
         )
 
 

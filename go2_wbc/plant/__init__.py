@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from go2_wbc.plant.base import Plant
@@ -13,7 +15,14 @@ __all__ = ["MujocoPlant", "Plant", "plant_in_world"]
 
 
 def plant_in_world(
-    world: World, *, seed: int = 0, initial_yaw: float = 0.0, initial_joint_noise: float = 0.0
+    world: World,
+    *,
+    seed: int = 0,
+    initial_yaw: float = 0.0,
+    initial_joint_noise: float = 0.0,
+    mjcf: Path | None = None,
+    keyframe: str | None = None,
+    visuals: bool = False,
 ) -> MujocoPlant:
     """A simulated robot in ``world``.
 
@@ -21,6 +30,7 @@ def plant_in_world(
         world: what is uncertain in it is drawn.
         seed: of that, and of every other random number of the plant.
         initial_yaw, initial_joint_noise: heading and spread of the joints at the start [rad].
+        mjcf, keyframe, visuals: as of ``MujocoPlant``; a file's joints are as it says.
     """
     own = world.sample(np.random.default_rng(seed))
     return MujocoPlant(
@@ -28,10 +38,13 @@ def plant_in_world(
         payload=own.payload,
         payload_place=own.payload_place,
         mass_scale=own.mass_scale,
-        joint_dynamics=JointDynamics().scaled(own.joint_friction),
+        joint_dynamics=None if mjcf else JointDynamics().scaled(own.joint_friction),
         sensors=own.sensors,
         delay=own.delay,
         seed=seed,
         initial_yaw=initial_yaw,
         initial_joint_noise=initial_joint_noise,
+        mjcf=mjcf,
+        keyframe=keyframe,
+        visuals=visuals,
     )

@@ -15,10 +15,12 @@ class Plant(ABC):
 
     Attributes:
         robot: name of the profile of the robot that it is.
+        model_file: its own MJCF or URDF, by which it is drawn; empty if it has none.
         joint_damping: viscous friction of the joints [N m s/rad], if it is written down, else 0.
     """
 
     robot: str = GO2
+    model_file: str = ""
     joint_damping: tuple[float, ...] = (0.0,) * 12
 
     @property

@@ -365,8 +365,7 @@ class Stones(_Pit):
         gap: between two of them, ahead and aside [m].
         count: of rows of stones, ahead.
         depth: of the pit [m].
-        uneven: by which a stone may be lower [m]; each is drawn evenly.
-        seed: of that.
+        uneven: by which a stone may be lower [m]; each is drawn evenly, by the ``seed``.
         start: where the pit begins, from the origin [m].
     """
 
@@ -402,8 +401,7 @@ class Gap(_Pit):
     """A gap across the way.
 
     Attributes:
-        length: of it [m].
-        depth: of it [m].
+        length, depth: of it [m].
         start: distance from the origin [m].
     """
 
@@ -468,10 +466,8 @@ class Course(Terrain):
         return sum(part.end for part in self.parts)
 
     def _shifted(self) -> Iterator[tuple[float, Terrain]]:
-        x = 0.0
-        for part in self.parts:
-            yield x, part
-            x += part.end
+        starts = itertools.accumulate((part.end for part in self.parts), initial=0.0)
+        return zip(starts, self.parts, strict=False)
 
     @property
     def pits(self) -> tuple[tuple[float, float], ...]:
@@ -500,6 +496,5 @@ class Patch(Terrain):
 
     def blocks(self) -> tuple[Block, ...]:
         """The strip."""
-        half = 0.5 * self.length
-        centre = (self.start + half, 0.0, 0.001)
-        return (Block(centre, (half, HALF_WIDTH, 0.001), friction=self.friction),)
+        slab = Block.slab(self.start, self.length, 0.0, 0.002)
+        return (replace(slab, friction=self.friction),)

@@ -18,7 +18,7 @@ from jaxtyping import Int
 
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
-from go2_wbc.records import ArrayNx3
+from go2_wbc.records import Array3, ArrayNx3
 from go2_wbc.robot.profile import GO2, RobotProfile, find_profile
 
 BASE_LINK = "base"
@@ -231,6 +231,39 @@ class MeshPart:
     points: ArrayNx3
     triangles: Int[np.ndarray, "m 3"]
     rgba: tuple[float, ...]
+
+
+def solid(kind: str, size: Array3, rgba: tuple[float, ...]) -> MeshPart | None:
+    """A simple shape about its middle; None of a kind that is not known here.
+
+    Args:
+        kind: "box" with half edges as size [m], "sphere" with a radius, "cylinder" or "capsule"
+            with a radius and half the length along z.
+        size: of it.
+        rgba: its colour.
+    """
+    from trimesh import creation
+
+    match kind:
+        case "box":
+            mesh = creation.box([2.0 * edge for edge in size])
+        case "sphere":
+            mesh = creation.icosphere(2, size[0])
+        case "cylinder":
+            mesh = creation.cylinder(size[0], 2.0 * size[1])
+        case "capsule":
+            mesh = creation.capsule(2.0 * size[1], size[0])
+        case _:
+            return None
+    return MeshPart(np.array(mesh.vertices), np.array(mesh.faces), rgba)
+
+
+def is_urdf(path: Path | str) -> bool:
+    """Whether a file is a URDF; MuJoCo's are XML, too."""
+    try:
+        return ET.parse(path).getroot().tag == "robot"
+    except ET.ParseError:
+        return False
 
 
 def read_mesh(path: Path) -> tuple[MeshPart, ...]:

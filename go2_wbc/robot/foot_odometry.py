@@ -161,12 +161,9 @@ def follow_foot(
     Args:
         f: whose estimate and covariance of the foot are moved on.
         foot: as ``see_foot`` has filled it.
-        leg: which.
         force: on it [N].
-        dt: [s].
         vertical: speed at which standing feet are pressed flat and spring back [m/s].
         rests: whether nothing moves.
-        c: numbers.
     """
     age = foot.age if force > c.contact_force else -dt
     slip = c.touchdown_slip * np.exp(-max(age, 0.0) / c.touchdown_time)

@@ -6,8 +6,9 @@ and v that of the IMU by the feet that stand, weighted by what they bear, all in
     gyro            d/dt (p_i - p_j) + w x (p_i - p_j) = 0    least squares over time
     accelerometer   d/dt s = a - w x s - R'g + (v - s) / T    (s - v) / T is its error
 
-Feet that slip do not turn together: an error of the gyro has to explain their residual, or to come
-with one of the accelerometer: feet seem to move otherwise, and soon gravity lies wrong. s is the
+Feet that slip do not turn together: an error of the gyro has to explain their residual. Where the
+gyro jumps from one reading to the next, whether the feet jump along is known at once, and of an
+error then all of it, also about the line between two feet of a trot. s is the
 velocity that the accelerometer integrates to, drawn to the feet's; between two steps nothing draws
 it. What has been wrong for a while is named and taken off, and so is what it has done to s.
 """
@@ -38,10 +39,15 @@ FOUND_AFTER, FOUND_SHARE = 0.2, 0.8
 it that the sums have taken in by then: 1 - exp(-0.16 / 0.1)."""
 REFINING = 0.2
 """Time [s] over which what is left of it is measured then: both pairs of a trot's feet stand."""
-EXPLAINED = 0.3
-"""Share of the feet's squared residual that an error of the gyro explains, if it is one."""
-WITH_FORCE = 0.16
-"""Time [s] after which an error of the accelerometer speaks for one of the gyro, if it has one."""
+EXPLAINED, UNEXPLAINED = 0.3, 0.3
+"""Share of the feet's squared residual that an error of the gyro explains, if it is one, and what
+else they may turn by [rad/s]: one that lies down on slippery ground slides by 0.46."""
+JUMP, SEEN, JUMP_LASTS, LONGEST_JUMP = 0.3, 0.4, 0.03, 0.25
+"""Change of the gyro from one reading to the next [rad/s] that may be an error; what feet that do
+not jump along have to show of it [m^2/s^2], for how long at least [s], and at most."""
+JUMP_SHARE, NO_JUMP, JUMP_EXPLAINED = (0.7, 1.4), 0.5, 0.85
+"""Range of the share of the jump that they lack, if it is an error; share below which it is none;
+and the share of their squared residual that an error explains: 0.97 of most, a slip 0.8."""
 UNSEEN = 0.5
 """m^2 that is added to what feet tell of each axis of the gyro's error, and draws it towards 0: two
 feet tell nothing of a turn about the line between them. A pair adds 0.1 to 0.25 in each tick."""
@@ -50,6 +56,12 @@ FINER = 1.0 / 3.0
 FORCE_LIMIT, FORCE_LASTS, STAYING = 0.45, 0.25, 0.62
 """Error of the accelerometer [m/s^2] that is named, if it lasts so long [s] without falling below
 this share of what it was: what a blow leaves fades."""
+UPWARDS, UPWARDS_LASTS = 0.85, 0.1
+"""Share of it by which it points up or down, and how long [s] it lasts then: feet slide sideways,
+and a trot that believes it rises falls soon. Of sound ones 0.05 at most."""
+PUSHED = 0.6
+"""Share of it by which the legs push the robot sideways, as they do if all feet slide together:
+what the accelerometer feels then is true."""
 
 TILTED, TILT_LASTS, TILT_SHARE = 2.0, 0.1, 0.7
 """Once the gyro has erred, an error of the accelerometer is a tilt that it has left: taken back
@@ -66,10 +78,14 @@ class WatchedImu(Record):
         turning, turned, residual: normal equations of the gyro's error, and the squared residual.
         gyro_off, gyro_time: the error that is taken off [rad/s], for how long there has been one.
         refining: for how long what is left is still measured [s].
+        jump, jump_time: the last of the gyro [rad/s], and for how long it is looked at [s].
+        jump_seen, jump_lacks, jump_residual: sums of f . f, f . e and e . e, where feet that stand
+            would seem to move apart by f, if it were an error, and do so by e [m^2/s^2].
         since: time since an error of the gyro was taken off [s].
         speed: of the IMU by the accelerometer, drawn to that by the feet [m/s].
         excess, most_excess: error of the accelerometer, smoothed once more, and the greatest while
             there is one [m/s^2].
+        push: by which the legs push, smoothed [m/s^2].
         force_off, force_time: the same as of the gyro, of the accelerometer [m/s^2].
         turn: by which the gyro has turned whoever believed it until now [rad].
         gyro_is_off, force_is_off: 1 for what is broken.
@@ -84,10 +100,16 @@ class WatchedImu(Record):
     gyro_off: Array3
     gyro_time: float
     refining: float
+    jump: Array3
+    jump_time: float
+    jump_seen: float
+    jump_lacks: float
+    jump_residual: float
     since: float
     speed: Array3
     excess: Array3
     most_excess: float
+    push: Array3
     force_off: Array3
     force_time: float
     turn: Array3
@@ -109,6 +131,13 @@ def note_bearing(m: WatchedImu, is_calm: bool, is_borne: bool, dt: float) -> Non
 
 
 @subroutine
+def note_push(m: WatchedImu, push: V3, dt: float) -> None:
+    """Smooth what the legs push by, sum f / m."""
+    for k in range(3):
+        m.push[k] += dt / SETTLING * (push[k] - m.push[k])
+
+
+@subroutine
 def note_turn(m: WatchedImu, between: V3, apart: V3, w: V3) -> None:
     """Add what two feet that stand say of the gyro's error d: apart + (w - d) x between = 0.
 
@@ -119,7 +148,12 @@ def note_turn(m: WatchedImu, between: V3, apart: V3, w: V3) -> None:
     e = (apart[0] + moved[0], apart[1] + moved[1], apart[2] + moved[2])
     b = cross(between, e)
     length = between[0] * between[0] + between[1] * between[1] + between[2] * between[2]
-    m.residual += e[0] * e[0] + e[1] * e[1] + e[2] * e[2]
+    m.residual += dot(e, e)
+    if m.jump_time > 0.0:
+        seen = cross(triple(m.jump), between)
+        m.jump_seen += dot(seen, seen)
+        m.jump_lacks += dot(seen, e)
+        m.jump_residual += dot(e, e)
     for i in range(3):
         m.turned[i] += b[i]
         m.turning[i, i] += length
@@ -162,20 +196,42 @@ def judge_gyro(m: WatchedImu, dt: float) -> None:
         if m.refining <= 0.0:
             take_off(m, error, FOUND_AFTER + REFINING)
         return
-    explained = error[0] * m.turned[0] + error[1] * m.turned[1] + error[2] * m.turned[2]
-    is_large = dot(error, error) > GYRO_LIMIT**2
-    is_off = is_large and explained > EXPLAINED * m.residual
+    explained = dot(error, triple(m.turned))
+    most = UNEXPLAINED**2 * (m.turning[0, 0] + m.turning[1, 1] + m.turning[2, 2])
+    is_off = explained > max(EXPLAINED * m.residual, m.residual - most)
+    is_off = is_off and dot(error, error) > GYRO_LIMIT**2
     m.gyro_time = m.gyro_time + dt if is_off else 0.0
-    if m.gyro_time > GYRO_LASTS or (is_large and m.force_time > WITH_FORCE):
+    if m.gyro_time > GYRO_LASTS:
         m.gyro_is_off, m.refining = 1.0, REFINING
         share = 1.0 / FOUND_SHARE
         take_off(m, (share * error[0], share * error[1], share * error[2]), FOUND_AFTER)
 
 
 @subroutine
+def judge_jump(m: WatchedImu, change: V3, dt: float) -> None:
+    """Take off what the gyro has jumped by since the last reading if the feet lack it for a while.
+
+    With f and e of each pair the share that they lack is sum f . e / sum f . f, least squares.
+    """
+    if m.jump_time > 0.0:
+        m.jump_time += dt
+        is_told = m.jump_seen > SEEN and m.jump_time > JUMP_LASTS
+        explains = m.jump_lacks**2 > JUMP_EXPLAINED * m.jump_seen * m.jump_residual
+        share = m.jump_lacks / m.jump_seen if m.jump_seen > 0.0 else 1.0
+        if is_told and explains and JUMP_SHARE[0] < share < JUMP_SHARE[1]:
+            m.gyro_is_off, m.refining = 1.0, REFINING
+            take_off(m, triple(m.jump), m.jump_time)
+        elif share < NO_JUMP or m.jump_time > LONGEST_JUMP:
+            m.jump_time = 0.0
+    if m.jump_time == 0.0 and m.stood >= CALM and dot(change, change) > JUMP**2:
+        put(change, m.jump)
+        m.jump_time, m.jump_seen, m.jump_lacks, m.jump_residual = dt, 0.0, 0.0, 0.0
+
+
+@subroutine
 def take_off(m: WatchedImu, error: V3, time: float) -> None:
     """Take an error of the gyro off that has been there for so long [s]."""
-    m.gyro_time, m.is_found, m.stood, m.since = 0.0, 1.0, CALM, 0.0
+    m.gyro_time, m.jump_time, m.is_found, m.stood, m.since = 0.0, 0.0, 1.0, CALM, 0.0
     for i in range(3):
         m.gyro_off[i] += error[i]
         m.turn[i] = time * error[i]
@@ -202,13 +258,18 @@ def judge_accelerometer(
         put(v, s)
         m.excess[:] = 0.0
     is_fine = m.since < TILTED if is_tilt else m.force_is_off > 0.0
-    amount = np.sqrt(dot(triple(m.excess), triple(m.excess)))
+    excess, push = triple(m.excess), triple(m.push)
+    amount, rise = np.sqrt(dot(excess, excess)), dot(excess, up)
+    is_upwards = abs(rise) > UPWARDS * amount
+    sideways = dot(push, excess) - rise * dot(push, up)
+    is_pushed = sideways > PUSHED * (amount**2 - rise**2)
     if amount < max(FORCE_LIMIT * (FINER if is_fine else 1.0), STAYING * m.most_excess):
         m.force_time = m.most_excess = 0.0
-    elif stands:
+    elif stands and (is_tilt or is_upwards or not is_pushed):
         m.force_time += dt
         m.most_excess = max(m.most_excess, amount)
-    if m.force_time > (TILT_LASTS if is_tilt else FORCE_LASTS) and m.gyro_time == 0.0:
+    lasts = TILT_LASTS if is_tilt else UPWARDS_LASTS if is_upwards else FORCE_LASTS
+    if m.force_time > lasts and m.gyro_time == 0.0:
         m.force_time, m.is_found = 0.0, 1.0
         if is_tilt:
             by = cross(up, triple(m.excess))

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS
 from go2_wbc.records import Array3, Array4x3, Array12, Array18, Array19, layout_of
@@ -55,6 +56,7 @@ class RobotModel:
             below them the feet stand squarely.
     """
 
+    @typed()
     def __init__(
         self,
         description: RobotDescription | None = None,
@@ -115,6 +117,7 @@ class RobotModel:
         self.p_base_feet_nominal = self.p_base_hips.copy()
         self.p_base_feet_nominal[:, 1] += self.hip_width * np.array([leg.side for leg in LEGS])
 
+    @typed(late=True)
     def snapshot(self, state: RobotState, payload: Payload = NO_PAYLOAD) -> Snapshot:
         """Every dynamic quantity of ``state``, computed once.
 
@@ -122,7 +125,6 @@ class RobotModel:
         Pinocchio. The former takes the robot as it is at the first call.
 
         Args:
-            state: measured.
             payload: what the trunk carries beside what the model has.
         """
         if not state.q.flags.writeable:  # compiled code takes what it may write to
@@ -174,6 +176,7 @@ class RobotModel:
             self._carried = payload, robot
         return robot
 
+    @typed(late=True)
     def pinocchio_snapshot(self, state: RobotState, payload: Payload = NO_PAYLOAD) -> Snapshot:
         """The same as ``snapshot`` by Pinocchio's own functions, for any robot."""
         model, data, q, v = self.pin_model, self._data, state.q, state.v
@@ -216,10 +219,12 @@ class RobotModel:
             com_shift=com - bare,
         )
 
+    @typed()
     def center_of_mass(self, q: Array19) -> Array3:
         """CoM in the world [m] at configuration ``q``."""
         return np.array(pin.centerOfMass(self.pin_model, self._data, q))
 
+    @typed()
     def forward_kinematics(self, q: Array19) -> tuple[Array3, Array4x3]:
         """CoM (3,) and foot centres (4, 3) in the world [m] at configuration ``q``."""
         com = np.array(pin.centerOfMass(self.pin_model, self._data, q))
@@ -227,6 +232,7 @@ class RobotModel:
         feet = np.array([self._data.oMf[f].translation for f in self._foot_frames])
         return com, feet
 
+    @typed(late=True)
     def inverse_dynamics(self, q: Array19, v: Array18, a: Array18) -> Array18:
         """Generalised force M(q) a + h(q, v) [N, N m]."""
         return np.array(pin.rnea(self.pin_model, self._data, q, v, a))

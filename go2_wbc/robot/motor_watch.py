@@ -20,12 +20,13 @@ from go2_wbc.robot.state import JointCommand, PartFault, RobotState
 
 SETTLING = 0.1
 """Time constant [s] of the sums."""
-ASKED = 0.25
+ASKED = 0.06
 """Root mean square [N m] of what is asked, from which on a motor is judged."""
-NOISY_SPEED = 0.5
-"""Error [rad/s] of a joint's speed that is read with noise: times the damping gain, torque that
-seems to be asked for. Of a robot with noisy sensors six sound motors were named as it stood up."""
-WEAK, DEAD = 0.65, 0.42
+NOISY_SPEED, SPEED_SHARE = 1.0, 0.1
+"""Error of a joint's speed [rad/s], and share of it by which it errs besides: it is read with
+noise, and changes within a tick if the robot is flung. Times the damping gain it is torque that
+seems to be asked for: of half of it sound motors were named in `recover`."""
+WEAK, DEAD = 0.65, 0.46
 """Share below which it is broken, and below which it is dead: of one that has just died so much is
 left in the sums when it is named, and half a torque is half a torque."""
 LASTS = 0.12
@@ -70,7 +71,7 @@ def watch_motors(
         asked = min(max(asked, least), most)
         s.given[j] = keep * s.given[j] + (1.0 - keep) * given[j] * given[j]
         s.asked[j] = keep * s.asked[j] + (1.0 - keep) * asked * asked
-        least_asked = ASKED + kd[j] * NOISY_SPEED
+        least_asked = ASKED + kd[j] * (NOISY_SPEED + SPEED_SHARE * abs(v[6 + j]))
         is_weak = s.asked[j] > least_asked * least_asked and s.given[j] < WEAK * WEAK * s.asked[j]
         s.weak_time[j] = s.weak_time[j] + dt if is_weak else 0.0
         if s.weak_time[j] > LASTS and found < 0:

@@ -189,13 +189,10 @@ def follow_wrench(
     """Let the mean wrench take up this tick.
 
     Args:
-        now: of this tick.
         v_before: velocity ``dt`` seconds ago.
         tau: torques that acted since.
         contact: feet in measured contact.
-        dt: [s].
         place: of the payload that the snapshot already has.
-        c: numbers.
         mean: is changed.
     """
     if not can_feel(now, contact, c.config):

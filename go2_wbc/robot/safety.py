@@ -127,7 +127,6 @@ class FallDetector:
         """Why the robot counts as fallen, or None.
 
         Args:
-            snapshot: of this tick.
             sag: depth [m] of the trunk below where it shall be.
             lean: angle [rad] between the trunk's attitude and the wanted one, heading left out.
             may_lie: whether the belly may be on the ground.

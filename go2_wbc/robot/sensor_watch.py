@@ -4,7 +4,7 @@ Every reading passes here before the estimator. One that contradicts the others 
 named, and put right where they tell what it should have been. The residuals:
 
     encoder jumps    q - q_last - v dt                            the jump is taken off from then on
-    encoder stuck    q and v stay while the leg's others turn     nothing replaces it
+    encoder stuck    q and v stay while the leg's others do not   nothing replaces it
     foot's force     against f = -J^-T (tau - M dv/dt)            replaced by f
     IMU              against feet that stand: ``imu_watch``       the error is taken off
 
@@ -33,7 +33,9 @@ from go2_wbc.robot.imu_watch import (
     WatchedImu,
     judge_accelerometer,
     judge_gyro,
+    judge_jump,
     note_bearing,
+    note_push,
     note_turn,
 )
 from go2_wbc.robot.leg_kinematics import LegGeometry, Legs, leg_table
@@ -46,9 +48,9 @@ LONGEST_STEP, USUAL_STEP = 0.05, 0.002
 """Time [s] between two readings of one stretch, and that taken for the first one's."""
 DOUBT = 0.01
 """Time [s] after which a joint that reads the very same says nothing of the IMU."""
-STUCK_TIME, STUCK_TRAVEL = 0.1, 0.03
-"""An encoder is stuck if it has read the very same for so long [s], while the other joints of its
-leg have turned so far [rad]."""
+STUCK_TIME = 0.1
+"""An encoder is stuck if it has read the very same for so long [s], while its leg's others have
+changed: noise alone lets none stay for more than 8 ms, not even at rest."""
 SMOOTHING = 0.008
 """Time constant [s] of the joints' accelerations."""
 LOADED, FREE = 20.0, 10.0
@@ -58,9 +60,10 @@ UNFELT, SENSED = 3.0, 25.0
 """Force [N] below which a sensor says that the foot is free, and above which it says it stands."""
 FORCE_TIME, SAME_TIME = 0.12, 0.25
 """Time [s] for which they contradict each other, and in which a living sensor changes."""
-NOISY, MOST_NOISE, NOISE_TIME = 1.5, 4.0, 0.5
+NOISY, MOST_NOISE, NOISE_TIME = 1.5, 4.0, 0.2
 """Mean of |f - 2 f_1 + f_2|, up to so much [N], over this time [s], above which a sensor has noise:
-its own is 2.6. Others say the same while the load stays: they are judged once that changes."""
+its own is 2.6. While such a one changes it lives, whatever its leg bears: a calf may lie on a box.
+Others say the same while the load stays: they are judged once that changes."""
 CHANGED = 15.0
 """By so much [N]."""
 RUBBING = 2.0
@@ -83,9 +86,8 @@ class WatchedSensors(Record):
         shift: what is taken off the angles [rad].
         dv: smoothed accelerations of the joints [rad/s^2].
         same: for how long a joint has read the very same [s].
-        travel: how far the other joints of its leg have turned since [rad].
         force, rise: the last of each foot [N], as it was read, and its last change.
-        noise: of it; see ``NOISY`` [N].
+        noise: of it, while it is free and while it stands; see ``NOISY`` [N].
         force_same: for how long it has been the very same [s].
         load: of the leg, when that began [N].
         against: for how long a foot's force has contradicted the leg's torques [s].
@@ -103,10 +105,9 @@ class WatchedSensors(Record):
     shift: Array12
     dv: Array12
     same: Array12
-    travel: Array12
     force: Array4
     rise: Array4
-    noise: Array4
+    noise: Float[np.ndarray, "2 4"]
     force_same: Array4
     load: Array4
     against: Array4
@@ -181,15 +182,13 @@ def watch_encoders(s: WatchedSensors, r: SensorReading, dt: float) -> None:
     s.whole = s.whole + 1.0 if dt < 1.5 * s.step else 0.0
     s.step = dt
     for j in range(12):
-        first, turned = 3 * (j // 3), 0.0
+        is_same = r.q_joints[j] == s.q[j] and r.v_joints[j] == s.v[j]
+        s.same[j] = s.same[j] + dt if is_same else 0.0
+    for j in range(12):
+        first, others = 3 * (j // 3), 0.0
         for k in range(first, first + 3):
-            turned += abs(r.q_joints[k] - s.q[k]) if k != j else 0.0
-        if r.q_joints[j] == s.q[j] and r.v_joints[j] == s.v[j]:
-            s.same[j] += dt
-            s.travel[j] += turned
-        else:
-            s.same[j], s.travel[j] = 0.0, 0.0
-        if s.same[j] > STUCK_TIME and s.travel[j] > STUCK_TRAVEL:
+            others = max(others, s.same[k]) if k != j else others
+        if s.same[j] > STUCK_TIME and others < DOUBT:
             s.stuck[j] = 1.0
     for j in range(12):
         jump = r.q_joints[j] - s.q[j] - 0.5 * (r.v_joints[j] + s.v[j]) * dt
@@ -253,22 +252,6 @@ def less_rolling(q: V3, u: V3, velocity: V3, w: V3, up: V3, radius: float) -> V3
 
 
 @subroutine
-def feels_the_same(s: WatchedSensors, force: float, leg: int, borne: float, dt: float) -> bool:
-    """Whether a foot's sensor says what it said before for longer than a living one does."""
-    rise = force - s.force[leg]
-    if rise == 0.0 and force > UNFELT:
-        s.force_same[leg] += dt
-    else:
-        s.force_same[leg], s.load[leg] = 0.0, borne
-    if rise != 0.0 and force > UNFELT:
-        share = 1.0 - np.exp(-dt / NOISE_TIME)
-        s.noise[leg] += share * (min(abs(rise - s.rise[leg]), MOST_NOISE) - s.noise[leg])
-    s.force[leg], s.rise[leg] = force, rise
-    is_odd = s.noise[leg] > NOISY or abs(borne - s.load[leg]) > CHANGED
-    return s.force_same[leg] > SAME_TIME and is_odd
-
-
-@subroutine
 def watch_force(
     s: WatchedSensors,
     r: SensorReading,
@@ -280,11 +263,25 @@ def watch_force(
 ) -> None:
     """Hold a foot's sensor against what its leg bears, give or take ``slack`` [N]."""
     force = r.foot_forces[leg]
-    is_same = feels_the_same(s, force, leg, borne, dt)
-    is_dead = force < UNFELT and borne - slack > LOADED
+    rise, felt = force - s.force[leg], 1 if force > UNFELT else 0
+    if rise == 0.0:
+        s.force_same[leg] += dt
+    else:
+        s.force_same[leg], s.load[leg] = 0.0, borne
+        has_landed = (s.force[leg] > UNFELT) != (felt == 1)
+        share = 0.0 if has_landed else 1.0 - np.exp(-dt / NOISE_TIME)
+        s.noise[felt, leg] += share * (
+            min(abs(rise - s.rise[leg]), MOST_NOISE) - s.noise[felt, leg]
+        )
+    s.force[leg], s.rise[leg] = force, rise
+    is_noisy = max(s.noise[0, leg], s.noise[1, leg]) > NOISY
+    is_dead = force < UNFELT and borne - slack > (FREE if is_noisy else LOADED)
     is_against = is_dead or (force > SENSED and borne + slack < FREE)
-    s.against[leg] = s.against[leg] + dt if is_against and carries else 0.0
-    if s.against[leg] > FORCE_TIME or (is_same and carries):
+    is_against = is_against and carries and (rise == 0.0 or not is_noisy)
+    s.against[leg] = s.against[leg] + dt if is_against else 0.0
+    has_changed = felt == 1 and abs(borne - s.load[leg]) > CHANGED
+    is_same = s.force_same[leg] > SAME_TIME and (has_changed or s.noise[felt, leg] > NOISY)
+    if carries and (is_same or s.against[leg] > FORCE_TIME):
         s.force_is_wrong[leg] = 1.0
     if s.force_is_wrong[leg] > 0.0:
         r.foot_forces[leg] = borne if borne > LOADED else 0.0
@@ -294,6 +291,7 @@ def watch_force(
 def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt: float) -> None:
     """Hold the feet's forces against the legs' torques, and the IMU against feet that stand."""
     m = s.imu
+    jump = plus_scaled(triple(r.gyro), -1.0, triple(s.gyro))
     for i in range(3):
         s.gyro[i], s.accelerometer[i] = r.gyro[i], r.accelerometer[i]
         r.gyro[i] -= m.gyro_off[i]
@@ -301,6 +299,7 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
     w = triple(r.gyro)
     places, speeds = np.empty((4, 3)), np.empty((4, 3))
     borne, slack, loads = np.empty(4), np.empty(4), np.empty(4)
+    push, per_mass = (0.0, 0.0, 0.0), c.gravity / c.weight
     for leg in range(4):
         j = slice(3 * leg, 3 * leg + 3)
         q, v = triple(r.q_joints[j]), triple(r.v_joints[j])
@@ -308,8 +307,9 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
         place, u, force, slack[leg] = leg_motion(c.legs.geometry[leg], q, v, tau)
         put(place, places[leg])
         put(less_rolling(q, v, u, w, up, c.foot_radius), speeds[leg])
-        borne[leg] = force[2]
+        borne[leg], push = force[2], plus_scaled(push, per_mass, force)
     moved = plus_scaled(triple(r.accelerometer), -c.gravity, up)
+    note_push(m, push, dt)
     is_up = up[2] > UPRIGHT
     is_borne = is_up and borne.sum() > CARRIED * c.weight
     note_bearing(m, is_up and dot(moved, moved) < THROWN**2, is_borne, dt)
@@ -318,6 +318,8 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
         stands = r.foot_forces[leg] > SENSED or borne[leg] - slack[leg] > LOADED
         is_used = stands and borne[leg] > LOADED and m.unborne == 0.0 and is_sound(s, leg)
         loads[leg] = borne[leg] if is_used else 0.0
+    m.is_found, m.turn[:] = 0.0, 0.0
+    judge_jump(m, jump, dt)
     watch_imu(s, r, c, places, speeds, loads, up, dt)
 
 
@@ -334,7 +336,6 @@ def watch_imu(
 ) -> None:
     """Let feet that stand judge the IMU: those with a load [N]; all in the base frame."""
     m, w, v = s.imu, triple(r.gyro), (0.0, 0.0, 0.0)
-    m.is_found, m.turn[:] = 0.0, 0.0
     for one in range(4):
         if loads[one] > 0.0:
             arm = plus_scaled(triple(places[one]), -1.0, triple(c.p_base_imu))
@@ -462,7 +463,7 @@ class SensorWatch:
 _OF_READING = tuple(slice(first, last) for first, last in pairwise((1, 4, 7, 19, 31, 43, 47)))
 """Where the arrays of a reading stand in its row."""
 _PARTS = (
-    *((name, "reads the same while its leg moves", False) for name in JOINT_NAMES),
+    *((name, "reads the same while its leg's others change", False) for name in JOINT_NAMES),
     *((name, "reads another angle than it turned to", True) for name in JOINT_NAMES),
     *((name, "feels another force than its leg bears", True) for name in FOOT_NAMES),
     ("gyro", "turns otherwise than the feet that stand", True),

@@ -17,6 +17,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.errors import CommandError
 from go2_wbc.records import Array3, Array3x3, Array4, Array4x3, Array12, Array18, Array19, Record
@@ -222,11 +223,13 @@ class JointCommand:
         return JointCommand(tau, _ZEROS, _ZEROS, _ZEROS, _ZEROS)
 
     @staticmethod
+    @typed()
     def damping(kd: float) -> JointCommand:
         """Limp and damped: the safe command."""
         return JointCommand(_ZEROS, _ZEROS, _ZEROS, _ZEROS, np.full(12, kd))
 
     @staticmethod
+    @typed()
     def servo(q_des: Array12, v_des: Array12, kp: float, kd: float) -> JointCommand:
         """A joint servo around a moving target."""
         return JointCommand(_ZEROS, q_des, v_des, np.full(12, kp), np.full(12, kd))

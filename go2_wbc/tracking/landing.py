@@ -67,11 +67,11 @@ class Landings:
     Attributes:
         missed: feet that had no contact even ``TIME_OUT`` after they should have come down.
         error: greatest distance [m], on the level, of a foot that had landed from the place where
-            the plan, as it was placed at its start, wanted it.
+            the plan, as it was placed at its start, wanted it; None if none has landed.
     """
 
     missed: int
-    error: float
+    error: float | None
 
 
 class SteppingFoot(Record):

@@ -34,7 +34,6 @@ def fed_back(
         reference: of a solved plan, which tracks the CoM, in the world.
         feedback: in the motion's frame.
         anchor: where the motion takes place.
-        snapshot: of this tick.
     """
     if not 1 <= reference.stance.sum() <= MOST_FEET:
         return reference

@@ -54,12 +54,13 @@ class Deviation:
     Attributes:
         place: of the tracked point [m].
         attitude: angle of the trunk [rad].
-        joints: angle [rad] of the worst joint of a raised leg, over the ticks that had one.
+        joints: angle [rad] of the worst joint of a raised leg, over the ticks that had one; None
+            if there was none.
     """
 
     place: float
     attitude: float
-    joints: float
+    joints: float | None
 
 
 class Correction(Record):
@@ -138,13 +139,14 @@ class PlanTracker:
     def landings(self) -> Landings:
         """What came of the landings of feet that step."""
         landing = self._state.landing
-        return Landings(int(landing.missed), float(landing.error))
+        return Landings(int(landing.missed), float(landing.error) or None)
 
     @property
     def deviation(self) -> Deviation:
         """How far the robot has been off the plan, the correction left out."""
         s = self._state
-        return Deviation(float(s.place), float(s.attitude), float(s.joints))
+        joints = float(s.joints) if s.raised_ticks else None
+        return Deviation(float(s.place), float(s.attitude), joints)
 
     @property
     def sag_and_lean(self) -> tuple[float, float]:

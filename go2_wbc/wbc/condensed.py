@@ -61,8 +61,6 @@ _FORCES_END = layout_of(Target).slice("normal_force_max").stop
 UNSUITED = 10
 """Outcome, beside those of ``active_set``: a singular leg, which is for the full QP, or numbers
 that are not finite."""
-MOST_ROWS = 44
-"""Five for each of four feet, two for each of twelve joints."""
 
 
 class Reduction(Record):

@@ -6,11 +6,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
+from go2_wbc.errors import SolverUnavailable, unknown_name
 from go2_wbc.records import Array3
 from go2_wbc.reference import LEAST_WEIGHT, MOST_WEIGHT
 from go2_wbc.robot.motor import JointFriction
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, Rule, between, ranged
+from go2_wbc.wbc.solvers import SOLVERS
 from go2_wbc.world import RANGES
 
 WEIGHTS = (1e-3, 1e3)
@@ -71,6 +74,7 @@ class DynamicWbcConfig:
     friction: float = 0.475
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(
     POSITIVE,
@@ -142,6 +146,11 @@ class WbcConfig:
     dynamic: DynamicWbcConfig = field(default_factory=DynamicWbcConfig)
 
     __repr__ = brief
+
+    def __post_init__(self) -> None:
+        """Raise SolverUnavailable for an unknown solver; lists the valid ones."""
+        if self.solver not in SOLVERS:
+            raise SolverUnavailable(unknown_name("QP solver", self.solver, SOLVERS))
 
     @property
     def for_dynamics(self) -> WbcConfig:

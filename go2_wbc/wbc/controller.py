@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.algebra.active_set import SOLVED
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.errors import ConfigError, QpInfeasible, ResidualRow, unknown_name
 from go2_wbc.records import Array4x3, Array12, Array18, Array30, layout_of, packed
@@ -44,6 +45,8 @@ from go2_wbc.wbc.tasks import BuiltInTasks, Task
 
 GREATEST_EXTRA_WEIGHT = 1e4
 """Weight of a user's own task beyond which nothing is left of the others' accuracy."""
+BACKENDS = ("condensed", "full", "placo")
+"""Names of the back ends, the usual one first."""
 _IN_BODY = frozenset(BodyTarget.__dataclass_fields__)
 _IN_STATE = ("q", "v")
 _Z, _TAU, _MOTORS = (layout_of(Decision).slice(part) for part in ("z", "tau", "tau_motors"))
@@ -131,6 +134,7 @@ class WholeBodyController:
     ``backend`` is "condensed" (default), "full" (the same QP without elimination), or "placo".
     """
 
+    @typed()
     def __init__(
         self,
         model: RobotModel,
@@ -183,11 +187,16 @@ class WholeBodyController:
             return SOLVER, PlacoBackend(self.model, self.config).solve
         ours = {"condensed": solve_condensed, "full": solve_full}
         if name not in ours:
-            raise ConfigError(unknown_name("WBC back end", name, (*ours, "placo")))
+            raise ConfigError(unknown_name("WBC back end", name, BACKENDS))
         return solver, partial(ours[name], solver=solver)
 
+    @typed(late=True)
     def formulate(self, snapshot: Snapshot, reference: Reference) -> Problem:
-        """The QP of this tick."""
+        """The QP of this tick.
+
+        Raises:
+            ConfigError: for a task or constraint whose rows do not fit.
+        """
         task_rows = [task.rows(snapshot, reference) for task in self.tasks]
         equality_rows = [item.rows(snapshot, reference) for item in self.equalities]
         bounds = [item.bounds(snapshot, reference) for item in self.inequalities]
@@ -207,6 +216,7 @@ class WholeBodyController:
             ),
         )
 
+    @typed(late=True)
     def solve(
         self, snapshot: Snapshot, reference: Reference, *, relax: bool = False
     ) -> WbcSolution:
@@ -255,6 +265,7 @@ class WholeBodyController:
         """Whether ticks are solved by the compiled kernel: condensed, and by ``active_set``."""
         return self._is_compiled
 
+    @typed(late=True)
     def solve_compiled(self, snapshot: Snapshot, reference: Reference) -> WbcSolution | None:
         """Solve one tick by the kernel; None if it is not used here or finds no solution."""
         if not self.is_compiled:

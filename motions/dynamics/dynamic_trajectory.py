@@ -154,7 +154,8 @@ class DynamicTrajectory:
         try:
             with np.load(io.BytesIO(content), allow_pickle=False) as file:
                 header = json.loads(str(file["header"]))
-                arrays = {name: _wide(file[name]) for name in _ARRAYS}
+                arrays = {name: file[name] for name in _ARRAYS}
+            arrays |= {n: a.astype(float) for n, a in arrays.items() if a.dtype == np.float16}
             version = header["format"]
             misses = tuple(Miss(*row) for row in header["misses"])
             iterations = int(header["iterations"])
@@ -167,10 +168,6 @@ class DynamicTrajectory:
             raise MotionError(f"a trajectory of format {version}; this version reads {FORMAT}")
         _check_shapes(arrays)
         return DynamicTrajectory(**arrays, iterations=iterations, cost=cost, misses=misses, lag=lag)
-
-
-def _wide(array: np.ndarray) -> np.ndarray:
-    return array.astype(float) if array.dtype == np.float16 else array
 
 
 def _check_shapes(arrays: dict[str, np.ndarray]) -> None:

@@ -16,7 +16,7 @@ from go2_wbc.errors import TimelineError
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.rotations import yaw_rotation
 from motions.arguments import is_number
-from motions.dynamics.phases import ALL_FEET, GRAVITY, KNOT_PERIOD, Phase
+from motions.dynamics.phases import ALL_FEET, GRAVITY, KNOT_PERIOD, Phase, whole_knots
 
 FOOTPRINT = np.array([[0.1934, 0.142], [0.1934, -0.142], [-0.1934, 0.142], [-0.1934, -0.142]])
 """Where the feet stand [m] around their middle, ahead and to the left: below the hips."""
@@ -66,7 +66,7 @@ def jump(
     half = _half_flight(height)
     if flight is not None:
         _require("a jump's time in the air", flight, 2.0 * KNOT_PERIOD, LONGEST_FLIGHT)
-        half = _whole(0.5 * flight)
+        half = whole_knots(0.5 * flight)
     return (
         Phase(GATHER, body=_at(z=CROUCH), label="crouch"),
         Phase(PUSH, label="push"),
@@ -112,7 +112,7 @@ def rear(pitch: float = math.radians(-25.0), hold: float = 0.6) -> tuple[Phase, 
     """
     _require_angle("the pitch of rearing", pitch, math.radians(-60.0), math.radians(-5.0))
     _require("the time of rearing", hold, 0.2, 1.0)
-    half = _whole(0.5 * hold)
+    half = whole_knots(0.5 * hold)
     back = float(FOOTPRINT[Leg.RL, 0]) * (1.0 - 1.0 / math.cosh(half / PENDULUM_TIME))
     return (
         Phase(LEAN_BACK, body=_at(z=LEAN), label="lean"),
@@ -153,11 +153,7 @@ def _at(z: float) -> tuple[float, float, float, float, float, float]:
 
 def _half_flight(height: float) -> float:
     """Time [s] to fall from ``height``, in whole knots."""
-    return _whole(math.sqrt(2.0 * height / GRAVITY))
-
-
-def _whole(time: float) -> float:
-    return max(round(time / KNOT_PERIOD), 1) * KNOT_PERIOD
+    return whole_knots(math.sqrt(2.0 * height / GRAVITY))
 
 
 def _moved(

@@ -16,6 +16,7 @@ from types import MappingProxyType
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import TimelineError
 from go2_wbc.legs import LEGS, Leg
 from motions.arguments import is_number, positive
@@ -83,8 +84,12 @@ class Phase:
     def __str__(self) -> str:
         return f"phase {self.label!r}" if self.label else "a phase"
 
+    def __hash__(self) -> int:
+        """Mapping proxies have none."""
+        return hash((self.duration, self.stance, self.body, *sorted(self.feet.items()), self.label))
+
     def __reduce__(self) -> tuple[object, ...]:
-        """Mapping proxies cannot be pickled."""
+        """Nor can they be pickled."""
         return Phase, (self.duration, self.stance, self.body, dict(self.feet), self.label)
 
     def _place(self, leg: Leg, place: Iterable[float]) -> tuple[float, float, float]:
@@ -113,6 +118,7 @@ class FullState:
     v: Float[np.ndarray, "18"]
 
 
+@typed(error=TimelineError)
 @dataclass(frozen=True, slots=True)
 class Tolerance:
     """How far a plan may be from what was asked before it counts as none.
@@ -188,6 +194,11 @@ class PhaseProblem:
                 last[leg] = place
             shifts[row] = last
         return shifts
+
+
+def whole_knots(time: float) -> float:
+    """``time`` [s] in whole knots."""
+    return max(round(time / KNOT_PERIOD), 1) * KNOT_PERIOD
 
 
 def _leg(leg: object) -> Leg:

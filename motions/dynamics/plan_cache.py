@@ -1,8 +1,12 @@
-"""Dynamic plans are solved once: kept on disk by a hash of everything that they depend on."""
+"""Dynamic plans are solved once: kept on disk by a hash of everything that they depend on.
+
+So is, that none was found.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import logging
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
@@ -13,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from go2_wbc.errors import ConfigError, MotionError
+from go2_wbc.errors import ConfigError, MotionError, PlanNotFound
 from go2_wbc.files import write_atomically
 from go2_wbc.robot.model import RobotModel
 from motions.dynamics.dynamic_trajectory import DynamicTrajectory
@@ -83,14 +87,36 @@ def _kept(
     model: RobotModel,
     solved: Callable[[], DynamicTrajectory],
 ) -> DynamicTrajectory:
-    """The plan of the first of ``files`` that has one, judged; or a new one, put into the last."""
+    """The plan of the first of ``files`` that has one, judged; or a new one, put into the last.
+
+    That there is none within the tolerance is kept beside it.
+    """
     for file in files:
         if (plan := _read(file)) is not None:
             accept(plan, tolerance, model)
             return plan
-    plan = solved()
-    _write(files[-1], plan)
+    failure = files[-1].with_name(f"{files[-1].stem}-{_hash(astuple(tolerance))[:8]}.json")
+    if (known := _read_failure(failure)) is not None:
+        raise known
+    try:
+        plan = solved()
+    except PlanNotFound as error:
+        message, *_ = str(error).split("\n")
+        _write(failure, json.dumps([message, error.reasons]).encode())
+        raise
+    _write(files[-1], plan.to_bytes())
     return plan
+
+
+def _read_failure(path: Path) -> PlanNotFound | None:
+    try:
+        message, reasons = json.loads(path.read_text(encoding="utf-8"))
+        return PlanNotFound(str(message), tuple(map(str, reasons)))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, TypeError) as error:
+        _log.warning("%s is of no use: its plan is looked for anew (%s)", path, error)
+        return None
 
 
 def plan_folder() -> Path:
@@ -116,7 +142,7 @@ def ship(problem: PhaseProblem, model: RobotModel, folder: Path) -> Path:
 
 def keep(problem: PhaseProblem, model: RobotModel, plan: DynamicTrajectory) -> None:
     """Keep ``plan``, found in another way, as what ``solve_cached`` answers to ``problem``."""
-    _write(plan_folder() / f"{_key(problem, model, PlanLimits())}.npz", plan)
+    _write(plan_folder() / f"{_key(problem, model, PlanLimits())}.npz", plan.to_bytes())
 
 
 def _read(path: Path) -> DynamicTrajectory | None:
@@ -129,12 +155,12 @@ def _read(path: Path) -> DynamicTrajectory | None:
         return None
 
 
-def _write(path: Path, trajectory: DynamicTrajectory) -> None:
+def _write(path: Path, content: bytes) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=path.parent):
             pass
-        write_atomically(path, trajectory.to_bytes())
+        write_atomically(path, content)
     except (OSError, ConfigError) as error:
         _log.warning("the dynamic plan cannot be kept in %s: %s", path.parent, error)
 

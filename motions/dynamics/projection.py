@@ -88,8 +88,6 @@ def nearest(
     time, and how far from its place each foot lands; ``lag`` is how late it is as a whole.
 
     Args:
-        written: what is asked.
-        model: the robot.
         tolerance: how far it may be off.
         progress: called after every iteration with their number and the cost.
 

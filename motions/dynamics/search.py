@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
+import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 
 import crocoddyl
@@ -28,7 +30,10 @@ AGREED = 1.05
 """Torque over what the plan may use at its speeds with which it is done: 0.89 of what the motors
 give in the middle of a step, all of it at its end (``PlanLimits``). Exact agreement takes many
 rounds."""
+FIRST_ANSWER = 0.45
+"""Processor time [s] of a search after which it says what binds so far."""
 _JOINT_RATES = slice(19 + 6, None)
+_log = logging.getLogger(__name__)
 
 _Rows = list[Float[np.ndarray, " n"]]
 
@@ -47,18 +52,27 @@ class Clock(crocoddyl.CallbackAbstract):
         iterations: done so far.
     """
 
-    def __init__(self, budget: float, progress: Progress | None) -> None:
-        """Start; the budget is processor time [s]."""
+    def __init__(
+        self,
+        budget: float,
+        progress: Progress | None,
+        binds: Callable[[crocoddyl.SolverBoxFDDP], Sequence[str]],
+    ) -> None:
+        """Start; the budget is processor time [s]; ``binds`` says what is still in the way."""
         super().__init__()
         self.iterations = 0
         self._deadline = time.thread_time() + budget
-        self._progress = progress
+        self._first = time.thread_time() + FIRST_ANSWER
+        self._progress, self._binds = progress, binds
 
     def __call__(self, solver: crocoddyl.SolverBoxFDDP) -> None:
         """Called after every iteration."""
         self.iterations += 1
         if self._progress is not None:
             self._progress(self.iterations, float(solver.cost))
+        if time.thread_time() > self._first:
+            self._first = math.inf
+            _log.info("no plan yet; what binds: %s", "; ".join(self._binds(solver)) or "nothing")
         if time.thread_time() > self._deadline:
             raise _Expired
 
@@ -72,7 +86,7 @@ class Search:
         full: ShootingProblem,
         knots: Knots,
         *,
-        is_good: Callable[[Solution], bool],
+        objections: Callable[[Solution], list[str]],
         turns: Callable[[Solution], bool],
         budget: float,
         progress: Progress | None,
@@ -80,15 +94,15 @@ class Search:
     ) -> None:
         """Prepare; the budget, processor time [s], runs from here; ``start`` is tried first.
 
-        ``is_good`` says whether a solution may be taken although the solver has not converged: it
-        obeys the dynamics, and what more it could gain is only cost. ``turns`` says whether a
-        solution turns as often as it was asked to: the costs cannot tell, so that one that has
-        converged may not.
+        ``objections`` says what is against a solution. One without any may be taken although the
+        solver has not converged: it obeys the dynamics, and what more it could gain is only cost.
+        ``turns`` says whether a solution turns as often as it was asked to: the costs cannot tell,
+        so that one that has converged may not.
         """
-        self._is_good, self._turns = is_good, turns
+        self._objections, self._turns = objections, turns
         self._full, self._knots, self._budget = full, knots, budget
         self._start = start
-        self._clock = Clock(budget, progress)
+        self._clock = Clock(budget, progress, lambda now: objections(_found(now, full, knots, 0)))
         self._soft_solver, self._solver = self._solver_of(soft), self._solver_of(full)
 
     def _solver_of(self, program: ShootingProblem) -> crocoddyl.SolverBoxFDDP:
@@ -110,13 +124,16 @@ class Search:
                 f"no dynamic plan within {self._budget:g} s of processor time "
                 f"({self._clock.iterations} iterations); ask for less, or give a larger budget"
             ) from None
-        return self._found()
+        return self._best()
 
     def best(self) -> Solution | None:
         """Where the search is, if that obeys the dynamics."""
         solver = self._solver
         is_whole = bool(len(solver.xs)) and solver.isFeasible and np.isfinite(solver.cost)
-        return self._found() if is_whole else None
+        return self._best() if is_whole else None
+
+    def _best(self) -> Solution:
+        return _found(self._solver, self._full, self._knots, self._clock.iterations)
 
     def _climb(self) -> None:
         """Starts, from the one that most often works to the last resort."""
@@ -125,7 +142,7 @@ class Search:
             best = self.best()
             if best is None:
                 continue
-            if self._turns(best) if converges else self._is_good(best):
+            if self._turns(best) if converges else not self._objections(best):
                 return
         raise PlanNotFound(
             "no dynamic plan: none of the starts converges to a motion that turns as asked "
@@ -143,7 +160,9 @@ class Search:
         guess = list(np.hstack([knots.q, knots.v]))
         still = [guess[0]] * len(guess)
         us = [self._full.tau_hold] * (len(guess) - 1)
-        for xs, regularisation in product((guess, still), REGULARISATIONS):
+        starts = product(zip(("a guess", "rest"), (guess, still), strict=True), REGULARISATIONS)
+        for (what, xs), regularisation in starts:
+            _log.info("trying to begin from %s, regularisation %g", what, regularisation)
             self._solve(soft, xs, us, regularisation, SOFT_STOP)
             yield list(soft.xs), list(soft.us), regularisation
 
@@ -174,16 +193,20 @@ class Search:
         converged = solver.solve(xs, us, ITERATIONS, False, regularisation)
         return bool(converged and solver.isFeasible and np.isfinite(solver.cost))
 
-    def _found(self) -> Solution:
-        solver, problem = self._solver, self._full.problem
-        problem.calc(solver.xs, solver.us)
-        forces = np.zeros((len(self._knots.stance), 4, 3))
-        for row, data in enumerate(problem.runningDatas):
-            contacts = data.differential.multibody.contacts.contacts.todict()
-            for leg in LEGS:
-                if self._knots.stance[row, leg]:
-                    forces[row, leg] = contacts[FOOT_NAMES[leg]].f.linear
-        return Solution(
-            np.array(solver.xs), np.array(solver.us), forces, np.array(solver.K),
-            self._clock.iterations, float(solver.cost),
-        )  # fmt: skip
+
+def _found(
+    solver: crocoddyl.SolverBoxFDDP, program: ShootingProblem, knots: Knots, iterations: int
+) -> Solution:
+    """Where ``solver`` is, with the forces that go with it."""
+    problem = program.problem
+    problem.calc(solver.xs, solver.us)
+    forces = np.zeros((len(knots.stance), 4, 3))
+    for row, data in enumerate(problem.runningDatas):
+        contacts = data.differential.multibody.contacts.contacts.todict()
+        for leg in LEGS:
+            if knots.stance[row, leg]:
+                forces[row, leg] = contacts[FOOT_NAMES[leg]].f.linear
+    return Solution(
+        np.array(solver.xs), np.array(solver.us), forces, np.array(solver.K),
+        iterations, float(solver.cost),
+    )  # fmt: skip

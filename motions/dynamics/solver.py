@@ -45,8 +45,6 @@ def solve(
     result depends on the arguments only; the time, on whether there is one.
 
     Args:
-        problem: what is asked.
-        model: the robot.
         budget: processor time [s] after which to give up.
         progress: called after every iteration with their number and the cost.
         limits: what the plan keeps.
@@ -172,7 +170,7 @@ def optimum(
     full = ShootingProblem(knots, model, limits, weights)
     search = Search(
         soft, full, knots,
-        is_good=lambda found: not objections(found),
+        objections=objections,
         turns=lambda found: task.plan(found).angle_deviation <= math.pi,
         budget=budget, progress=progress, start=start,
     )  # fmt: skip

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief, inline_html
 from go2_wbc.errors import CommandError, MotionError
 from go2_wbc.feasibility_limits import FeasibilityLimits
@@ -16,7 +17,7 @@ from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import RobotProfile
+from go2_wbc.robot.profile import GO2, RobotProfile
 from go2_wbc.world import World
 from motions.authoring import Motion
 from motions.batch_kinematics import centres_of_mass
@@ -50,12 +51,14 @@ class CheckedMotion:
         report: what the check says.
         path: the movement of the whole robot, in the frame of the motion.
         forces: contact forces and torques along it.
+        robot: name of the profile of the robot that was judged.
     """
 
     plan: MotionPlan
     report: FeasibilityReport
     path: Trajectory
     forces: Forces
+    robot: str = GO2
 
     _repr_html_ = inline_html
     __repr__ = brief
@@ -82,6 +85,7 @@ class CheckedMotion:
                 _label(float(t), stands, spans)
                 for t, stands in zip(path.times, path.stance, strict=True)
             ),
+            robot=self.robot,
         )
 
 
@@ -90,6 +94,7 @@ Playable = str | Path | Motion | Timeline | MotionPlan | CheckedMotion
 (with its default parameters), a timeline, a plan, or a motion that was checked before."""
 
 
+@typed("model", "mend", "progress")
 def compile_motion(
     motion: object,
     model: RobotModel,
@@ -153,6 +158,7 @@ class FeasibilityChecker:
         world: in which motions are checked.
     """
 
+    @typed()
     def __init__(
         self,
         model: RobotModel | None = None,
@@ -175,6 +181,7 @@ class FeasibilityChecker:
         self._collision = SelfCollision(self.model)
         self._hulls = hulls_of(self.model.description)
 
+    @typed("check")
     def plan(self, motion: Playable, *, check: bool = True) -> MotionPlan:
         """The plan of ``motion``, compiled and checked no more often than needed.
 
@@ -214,6 +221,7 @@ class FeasibilityChecker:
         """Instants [s] at which ``plan`` breaks a limit."""
         return np.concatenate([[], *(one.broken_at for one in self.evaluate(plan).report.series)])
 
+    @typed()
     def departure(self, plan: MotionPlan) -> dict[str, float]:
         """How far ``plan`` is from what was written, at most, by name with unit.
 
@@ -251,7 +259,7 @@ class FeasibilityChecker:
             departures=() if solved is None else departures(solved, model),
             world=self.world,
         )
-        return CheckedMotion(plan, report, path, forces)
+        return CheckedMotion(plan, report, path, forces, model.description.profile.name)
 
     def _judged(self, case: Case, plan: MotionPlan) -> list[Series]:
         """Every check, causes before what follows from them."""
@@ -303,6 +311,7 @@ class FeasibilityChecker:
         ]
 
 
+@typed("world")
 def check(
     motion: Playable,
     *,

@@ -229,7 +229,11 @@ class FeasibilityReport:
         return fitted().probability(margins)
 
     def raise_if_infeasible(self) -> None:
-        """Raise MotionInfeasible with the failures, if there are any."""
+        """Do nothing if it is feasible.
+
+        Raises:
+            MotionInfeasible: if it is not; carries the failures.
+        """
         if self.failures:
             raise MotionInfeasible(self.motion, self.failures)
 
@@ -262,9 +266,11 @@ class FeasibilityReport:
         return "\n".join([*lines, *map(str, self.departures)])
 
     def summary(self) -> str:
-        """One line: the verdict, and what is closest to its limit."""
+        """One line: the verdict, and what to mend first, or what is closest to its limit."""
         if not self.ok:
-            return f"no   {self.motion:<15} {_count(len(self.failures), 'limit')} broken"
+            first, *more = self.failures
+            rest = f"; {_count(len(more), 'more limit')}" if more else ""
+            return f"no   {self.motion:<15} {first}{rest}"
         tight = min(self.margins.values(), key=lambda f: f.margin / max(abs(f.limit), 1e-9))
         return (
             f"ok   {self.motion:<15} {self.duration:>5.1f} s   closest: {tight.check}, "

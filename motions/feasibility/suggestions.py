@@ -9,11 +9,13 @@ Where no change leads as far inside, those that just pass are better than none.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.errors import CommandError, MotionError, TimelineError
 from motions.feasibility.check import FeasibilityChecker, Playable, timeline_of
@@ -21,6 +23,7 @@ from motions.feasibility.report import FeasibilityReport
 from motions.language.keys import BalanceShift
 from motions.language.timeline import Timeline
 
+_log = logging.getLogger(__name__)
 _ReportOf = Callable[[Timeline], FeasibilityReport | None]
 AIM = 0.9
 """Least chance of what is suggested."""
@@ -31,7 +34,7 @@ class Suggestion:
     """A change that makes a motion feasible, and the least of its kind.
 
     Attributes:
-        kind: "tempo", "amplitude", "height", "shift time" or "tempo and amplitude".
+        kind: "tempo", "amplitude", "height", "shift time", "jump" or "tempo and amplitude".
         call: what to append to the motion, as Python.
         meaning: the same in words.
         change: how large it is, as a share of the largest of its kind that is tried.
@@ -73,6 +76,7 @@ class _Kind:
         calls: calls of one number each, in their order, by what that is for a number of steps.
         meaning: in words, of ``steps`` and of how long it ``lasts`` [s] after them.
         digits: to which the numbers are rounded.
+        finest: difference of two numbers of steps that is looked for.
     """
 
     name: str
@@ -80,6 +84,7 @@ class _Kind:
     calls: Mapping[str, Callable[[int], float]]
     meaning: str
     digits: int = 2
+    finest: int = 1
 
     def numbers(self, steps: int) -> dict[str, float]:
         """The calls' numbers, by their names."""
@@ -124,6 +129,14 @@ SHIFT_TIME = _Kind(
     {"scale_shifts": _longer},
     "{steps} % more time to move over the feet that stay",
 )
+JUMPS = _Kind(
+    "jump",
+    (20, 40, 60, 80),
+    {"scale_jumps": _smaller},
+    "jumps lower and shorter by {steps} %",
+    finest=5,
+)
+"""In few tries: each that has no plan is searched for long."""
 BOTH = _Kind(
     "tempo and amplitude",
     _SHARES,
@@ -132,6 +145,7 @@ BOTH = _Kind(
 )
 
 
+@typed("checker")
 def suggest(
     motion: Playable, *, checker: FeasibilityChecker | None = None
 ) -> tuple[Suggestion, ...]:
@@ -161,7 +175,7 @@ def suggest(
     if report_of(line) is not None:
         return ()
     for aim in (AIM, 0.0):
-        for kinds in ((TEMPO, AMPLITUDE, HIGHER, LOWER, SHIFT_TIME), (BOTH,)):
+        for kinds in ((TEMPO, AMPLITUDE, HIGHER, LOWER, SHIFT_TIME, JUMPS), (BOTH,)):
             found = [_least(line, kind, report_of, aim) for kind in kinds]
             if some := [one for one in found if one is not None]:
                 return tuple(sorted(some, key=lambda one: one.change))
@@ -175,6 +189,7 @@ def _least(line: Timeline, kind: _Kind, report_of: _ReportOf, aim: float) -> Sug
 
     def tried(steps: int) -> Suggestion | None:
         changed = kind.apply(line, steps)
+        _log.info("trying %s", kind.text(steps))
         if (report := report_of(changed)) is None or report.probability < aim:
             return None
         meaning = kind.meaning.format(steps=steps, lasts=report.duration)
@@ -182,21 +197,21 @@ def _least(line: Timeline, kind: _Kind, report_of: _ReportOf, aim: float) -> Sug
         return Suggestion(kind.name, kind.text(steps), meaning, share, changed, report)
 
     try:
-        return _first(tried, kind.ladder)
+        return _first(tried, kind)
     except TimelineError:  # the motion has calls that this cannot change
         return None
 
 
-def _first(tried: Callable[[int], Suggestion | None], ladder: Sequence[int]) -> Suggestion | None:
-    """Up the ``ladder`` to the first that passes, then by bisection to the least."""
+def _first(tried: Callable[[int], Suggestion | None], kind: _Kind) -> Suggestion | None:
+    """Up the ladder to the first that passes, then by bisection to the least."""
     refused = 0
-    for steps in ladder:
+    for steps in kind.ladder:
         if (best := tried(steps)) is not None:
             break
         refused = steps
     else:
         return None
-    while steps - refused > 1:
+    while steps - refused > kind.finest:
         middle = (refused + steps) // 2
         if (less := tried(middle)) is None:
             refused = middle

@@ -6,9 +6,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Self
 
+from go2_wbc.arguments import typed
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError
 from go2_wbc.legs import Leg
+from go2_wbc.validation import LARGEST
 from motions import arguments
 from motions.arguments import is_number, positive, quantity
 from motions.language.clock import LEAST_BEAT, SAME, BeatClock
@@ -42,6 +44,7 @@ class Arrangement(TimelineData):
 
     # --- time -----------------------------------------------------------------------------
 
+    @typed("name", error=TimelineError)
     def hold(self, seconds: float, *, name: str = "", foot: Leg | str | None = None) -> Self:
         """Stay as it is for this long.
 
@@ -68,7 +71,11 @@ class Arrangement(TimelineData):
         return replace(self, cursor=self.last_start, floor=self.cursor)
 
     def at(self, t: float) -> Self:
-        """Put the cursor ``t`` seconds (beats) after the start of the motion."""
+        """Put the cursor ``t`` seconds (beats) after the start of the motion.
+
+        Raises:
+            TimelineError: for a time before the start, or none.
+        """
         if not (is_number(t) and t >= 0.0):
             raise TimelineError(f"at() needs a time of 0 s or later, got {t!r}")
         return replace(self, cursor=self.clock.at(t))
@@ -78,6 +85,9 @@ class Arrangement(TimelineData):
 
         Before a foot is raised the trunk then moves aside in ``shift_time`` beats; by default in
         the fewest whole beats that are no shorter than the timeline's ``shift_time``.
+
+        Raises:
+            TimelineError: for a tempo that is out of range.
         """
         if not SLOWEST <= positive("bpm", beats_per_minute) <= FASTEST:
             raise TimelineError(
@@ -86,6 +96,7 @@ class Arrangement(TimelineData):
         interval = 60.0 / beats_per_minute
         return self._counted(BeatClock.steady(interval), shift_time)
 
+    @typed("times", error=TimelineError, late=True)
     def on_beats(self, times: Iterable[float], *, shift_time: float | None = None) -> Self:
         """Count in the beats at these ``times`` [s] of the motion from here on.
 
@@ -133,16 +144,24 @@ class Arrangement(TimelineData):
         return line
 
     def together(self, *others: TimelineData) -> Self:
-        """Do all of ``others`` at the same time, from the cursor on; they may not share a part."""
+        """Do all of ``others`` at the same time, from the cursor on; they may not share a part.
+
+        Raises:
+            TimelineError: for what is no timeline, or where two move the same part.
+        """
         line, start = self, self.cursor
         for other in _written("together()", others):
             line = line._joined(other, start)
         return replace(line, cursor=max([start, *(start + other.end for other in others)]))
 
     def repeat(self, times: int) -> Self:
-        """This whole motion, ``times`` times one after another; it must end as it began."""
-        if isinstance(times, bool) or not isinstance(times, int) or times < 1:
-            raise TimelineError(f"repeat() needs a whole number of 1 or more, got {times!r}")
+        """This whole motion, ``times`` times one after another; it must end as it began.
+
+        Raises:
+            TimelineError: for a number below 1, another end than start, or too long a motion.
+        """
+        if isinstance(times, bool) or not isinstance(times, int) or not 1 <= times <= LARGEST:
+            raise TimelineError(f"repeat() needs a whole number of 1 or more, got {times!r:.80}")
         self._require_length(times * max(self.end, SHORTEST))
         return self.then(*[self] * (times - 1))
 
@@ -153,7 +172,11 @@ class Arrangement(TimelineData):
     # --- made into another ----------------------------------------------------------------
 
     def scale_time(self, factor: float) -> Self:
-        """The same motion, ``factor`` times as long: 2 is half as fast."""
+        """The same motion, ``factor`` times as long: 2 is half as fast.
+
+        Raises:
+            TimelineError: for a factor that is not above 0.
+        """
         longer = positive("factor", factor)
         keys = tuple(key.slower(longer) for key in self.keys)
         return self._retimed(keys, lambda t: longer * t, longer)
@@ -162,6 +185,9 @@ class Arrangement(TimelineData):
         """The same motion with all offsets of trunk and feet multiplied: 0.5 is half as large.
 
         Postures and the angles of ``leg`` and ``joint`` are no offsets, and stay.
+
+        Raises:
+            TimelineError: for a factor that is not above 0.
         """
         share = positive("amplitude", amplitude)
         return replace(self, keys=tuple(key.scaled(share) for key in self.keys))
@@ -170,6 +196,9 @@ class Arrangement(TimelineData):
         """The same motion, its moves over the feet that stay, and back, ``factor`` times as long.
 
         What follows comes later; what goes on meanwhile takes as much longer. See ``shift_time``.
+
+        Raises:
+            TimelineError: for a factor that is not above 0.
         """
         longer = positive("factor", factor) - 1.0
         shifts = [
@@ -183,6 +212,29 @@ class Arrangement(TimelineData):
 
         keys = tuple(key.retimed(when) for key in self.keys)
         return self._retimed(keys, when, 1.0 + longer)
+
+    def scale_jumps(self, share: float) -> Self:
+        """The same motion, its dynamic blocks ``share`` as high, as far and as steep.
+
+        Flights last as long as that takes, and what follows comes sooner; turns stay.
+
+        Raises:
+            TimelineError: of a motion without a dynamic block, or that keeps a tempo.
+        """
+        share = positive("share", share)
+        keys = [key.smaller(share) if isinstance(key, PhaseKey) else key for key in self.keys]
+        saved = [
+            (old.end, old.end - new.end)
+            for old, new in zip(self.keys, keys, strict=True)
+            if isinstance(old, PhaseKey)
+        ]
+        if not saved or self.shift_beats:
+            raise TimelineError("scale_jumps() needs a dynamic block, and no tempo to be kept")
+
+        def when(t: float) -> float:
+            return t - sum(less for end, less in saved if end <= t + SAME)
+
+        return self._retimed(tuple(key.retimed(when) for key in keys), when, 1.0)
 
     def _retimed(
         self, keys: tuple[Key, ...], when: Callable[[float], float], factor: float

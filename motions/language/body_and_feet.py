@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Self
 
+from go2_wbc.arguments import typed
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
@@ -75,6 +76,9 @@ class BodyAndFeet(TimelineData):
 
         Angles follow the right hand: pitch > 0 lowers the nose, roll > 0 leans right, yaw > 0
         turns left.
+
+        Raises:
+            TimelineError: for no channel, a value that is no length or angle, or a wrong ease.
         """
         values = {"x": x, "y": y, "z": z, "roll": roll, "pitch": pitch, "yaw": yaw}
         given = {name: value for name, value in values.items() if value is not None}
@@ -88,17 +92,27 @@ class BodyAndFeet(TimelineData):
         return self._longer(keys, end)
 
     def posture(self, stance: Posture | str, *, over: float) -> Self:
-        """Move the trunk to another resting posture, on four feet; offsets count from there."""
+        """Move the trunk to another resting posture, on four feet; offsets count from there.
+
+        Raises:
+            TimelineError: for an unknown posture.
+        """
         which = word("posture", stance, _POSTURES)
         start, end = self._span(over)
         return self._longer([PostureKey(start, end, Ease.MINIMUM_JERK, which)], end)
 
+    @typed("name", error=TimelineError)
     def pose(self, name: str, *, over: float, ease: EaseWord = Ease.MINIMUM_JERK) -> Self:
-        """Move the trunk to a named pose: see ``POSES``."""
+        """Move the trunk to a named pose: see ``POSES``.
+
+        Raises:
+            TimelineError: for an unknown pose.
+        """
         if name not in POSES:
             raise TimelineError(unknown_name("pose", name, POSES))
         return self.body(**POSES[name], over=over, ease=ease)
 
+    @typed("times", error=TimelineError)
     def body_path(
         self,
         points: Sequence[Mapping[str, float]],
@@ -114,6 +128,9 @@ class BodyAndFeet(TimelineData):
             over: time for all of them.
             times: when each is passed, counted from the start of this move in the unit of ``over``;
                 the last one is ``over``. Without them they are evenly spaced.
+
+        Raises:
+            TimelineError: for points, times or values that are not as above.
         """
         if not (
             isinstance(points, Sequence) and all(isinstance(point, Mapping) for point in points)
@@ -139,6 +156,7 @@ class BodyAndFeet(TimelineData):
             keys.append(BodyPathKey(start, end, *way))
         return self._longer(keys, end)
 
+    @typed("x", "y", "z", error=TimelineError)
     def look_at(
         self,
         x: float,
@@ -154,6 +172,9 @@ class BodyAndFeet(TimelineData):
             x, y, z: the place [m], x ahead and y left of where the motion starts, z above the
                 ground. The trunk looks from where it is standing with its present offsets.
             over, ease: as for ``body``.
+
+        Raises:
+            TimelineError: for a place that is too near, or a value that is no length.
         """
         for name, value in {"x": x, "y": y, "z": z}.items():
             if not is_number(value):
@@ -184,6 +205,9 @@ class BodyAndFeet(TimelineData):
         """Move a foot [m] from where it stands; with ``frame="body"`` it goes with the trunk.
 
         It is on the ground again when x, y and z are 0 in the frame of the ground.
+
+        Raises:
+            TimelineError: for an unknown foot, a place below the ground, or a wrong value.
         """
         place = (quantity("x", x), quantity("y", y), quantity("z", z))
         in_frame = word("frame", frame, _FRAMES)
@@ -202,7 +226,11 @@ class BodyAndFeet(TimelineData):
         over: float,
         ease: EaseWord = Ease.MINIMUM_JERK,
     ) -> Self:
-        """Move the joints of a raised leg to these angles [rad]."""
+        """Move the joints of a raised leg to these angles [rad].
+
+        Raises:
+            TimelineError: for an unknown leg, or a value that is no angle.
+        """
         angles = (quantity("hip", hip), quantity("thigh", thigh), quantity("calf", calf))
         target = LegTarget(Frame.JOINTS, angles)
         return self._move_leg(arguments.foot(leg), target, over, ease)
@@ -221,6 +249,9 @@ class BodyAndFeet(TimelineData):
         The leg's other joints keep the angles that they have; so it must have been raised by
         ``leg``, or by ``foot`` in the frame of the body: on its way with the ground it has no
         angles of its own.
+
+        Raises:
+            TimelineError: for an unknown joint, a foot on the ground, or a wrong value.
         """
         which = arguments.foot(leg)
         if joint not in _JOINTS:
@@ -246,7 +277,11 @@ class BodyAndFeet(TimelineData):
         return self._longer([BalanceShift(start, end, Ease.MINIMUM_JERK, raised)], end)
 
     def down(self, leg: Leg | str, *, over: float) -> Self:
-        """Put a raised foot back where it stood."""
+        """Put a raised foot back where it stood.
+
+        Raises:
+            TimelineError: if the foot is not raised.
+        """
         which = arguments.foot(leg)
         if which not in self.raised:
             raise TimelineError(f"down(): foot {which.name} is not raised")

@@ -12,6 +12,7 @@ from dataclasses import replace
 from itertools import count, pairwise
 from typing import Self
 
+from go2_wbc.arguments import typed
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import LEGS, Leg
@@ -71,7 +72,11 @@ class DynamicBlocks(TimelineData):
         return self._to_beats((low, *others))
 
     def hop(self, times: int, *, height: float = 0.05, period: float = 0.5) -> Self:
-        """Hop in place ``times`` times, coming down once a ``period`` [s, beats]."""
+        """Hop in place ``times`` times, coming down once a ``period`` [s, beats].
+
+        Raises:
+            TimelineError: for a number that is not 1 to 10, or away from ``home``.
+        """
         phases = build.hop(times, self._seconds("hop(): period", period), height)
         return self._to_beats(phases, period)
 
@@ -88,6 +93,9 @@ class DynamicBlocks(TimelineData):
         """Lift two feet ``height`` [m] and put them back, in the air for ``hold`` seconds (beats).
 
         For one foot at a time, which takes no balance on a line, there is ``foot``.
+
+        Raises:
+            TimelineError: for what is not two feet, or away from ``home``.
         """
         given = legs if isinstance(legs, Collection) and not isinstance(legs, str) else (legs,)
         feet = sorted({arguments.foot(leg) for leg in given})
@@ -120,6 +128,7 @@ class DynamicBlocks(TimelineData):
         _lengthen(timed, len(phases) - 1, _next_beat(self.clock, now) - now)
         return self._block(tuple(timed))
 
+    @typed("stance", "body", "feet", "label", error=TimelineError)
     def phase(
         self,
         duration: float,
@@ -139,6 +148,9 @@ class DynamicBlocks(TimelineData):
             feet: places x, y, z [m] at the end of this phase, of feet in the air, from where they
                 stood at the start of the block.
             label: what messages call it.
+
+        Raises:
+            TimelineError: away from ``home``, or for an unknown coordinate or place.
         """
         phase = Phase(
             self._seconds("phase(): duration", duration),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from enum import Enum
@@ -13,7 +14,7 @@ from jaxtyping import Float
 from go2_wbc.errors import TimelineError
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import Posture
-from motions.dynamics.phases import Phase, PhaseProblem
+from motions.dynamics.phases import ALL_FEET, Phase, PhaseProblem, whole_knots
 from motions.language.easing import Easing
 
 BODY_CHANNELS = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -288,6 +289,11 @@ class PhaseKey(Key):
         """Where each foot comes to stand [m], in the frame of the feet at the start."""
         return PhaseProblem(self.phases).shift
 
+    def smaller(self, share: float) -> Self:
+        """``share`` as high, as far and as steep, its flights as long as that takes; turns stay."""
+        phases = tuple(_smaller(phase, share) for phase in self.phases)
+        return replace(self, phases=phases, end=self.start + sum(p.duration for p in phases))
+
     def slower(self, factor: float) -> Self:
         """Gravity does not wait."""
         raise TimelineError(
@@ -305,6 +311,18 @@ class PhaseKey(Key):
             f"scale({amplitude:g}) does not work with a dynamic block, whose heights and times go "
             "together; give its calls other numbers"
         )
+
+
+def _smaller(phase: Phase, share: float) -> Phase:
+    scaled = 2 if phase.stance == ALL_FEET else 5  # a crouch stays as deep
+    body = phase.body and (
+        *(share * part for part in phase.body[:scaled]), *phase.body[scaled:]
+    )  # fmt: skip
+    feet, less = phase.feet, 1.0 - share
+    x, y = (sum(place[axis] for place in feet.values()) / max(len(feet), 1) for axis in (0, 1))
+    moved = {leg: (a - less * x, b - less * y, share * c) for leg, (a, b, c) in feet.items()}
+    fall = phase.duration if phase.stance else whole_knots(math.sqrt(share) * phase.duration)
+    return replace(phase, duration=fall, body=body, feet=moved)
 
 
 def _across(value: object) -> object:

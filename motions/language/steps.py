@@ -10,6 +10,7 @@ from typing import Any, Self
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import LEGS, Leg
@@ -175,11 +176,6 @@ def rhythm_within(gait: StepGait, rounds: int, over: float) -> Rhythm:
     return Rhythm(rounds, stepping / (rounds - 1.0 + gait.last), gait.rest, over)
 
 
-def least_time(gait: StepGait, rounds: int) -> float:
-    """Seconds of so many rounds at the fastest."""
-    return 2.0 * gait.rest + (rounds - 1.0 + gait.last) * gait.least_period
-
-
 def steps_of(way: Way, gait: StepGait, rhythm: Rhythm, start: float) -> Iterator[StepKey]:
     """The steps of a stretch that starts at ``start`` [s].
 
@@ -227,6 +223,9 @@ class Steps(TimelineData):
             yaw: angle [rad] by which it also goes round the middle of the four feet.
             over: how long the foot is in the air.
             height: of the foot [m] in the middle of its way.
+
+        Raises:
+            TimelineError: for an unknown or raised foot, or a wrong value.
         """
         which = arguments.foot(leg)
         if which in self.raised:
@@ -238,6 +237,7 @@ class Steps(TimelineData):
         key = StepKey(start, end, Ease.MINIMUM_JERK, which, place, rise, since=start)
         return line._longer([key], end)
 
+    @typed("gait", error=TimelineError)
     def walk(
         self,
         x: float = 0.0,
@@ -254,6 +254,9 @@ class Steps(TimelineData):
             turn: angle [rad] by which the heading has turned then, to the left.
             over: how long it takes; by default as long as the gait needs. Alone, steps on the spot.
             gait: ``"walk"``, one foot after the other, or ``"trot"``, pairs across.
+
+        Raises:
+            TimelineError: for no way to go, an unknown gait, a raised foot, or a wrong value.
         """
         goal = [quantity(name, v, FARTHEST_WALK) for name, v in (("x", x), ("y", y))]
         goal.append(quantity("turn", turn))
@@ -265,13 +268,22 @@ class Steps(TimelineData):
         return self._stepped("walk()", Way(shares * np.array(goal)), over, gait)
 
     def turn(self, angle: float, over: float | None = None, *, gait: str = "walk") -> Self:
-        """Turn on the spot by ``angle`` [rad], to the left; see ``walk``."""
+        """Turn on the spot by ``angle`` [rad], to the left; see ``walk``.
+
+        Raises:
+            TimelineError: as ``walk``.
+        """
         return self.walk(turn=angle, over=over, gait=gait)
 
     def side_step(self, y: float, over: float | None = None, *, gait: str = "walk") -> Self:
-        """Go aside by ``y`` [m], to the left; see ``walk``."""
+        """Go aside by ``y`` [m], to the left; see ``walk``.
+
+        Raises:
+            TimelineError: as ``walk``.
+        """
         return self.walk(y=y, over=over, gait=gait)
 
+    @typed("gait", error=TimelineError)
     def path(
         self,
         points: Sequence[Sequence[float]],
@@ -286,6 +298,9 @@ class Steps(TimelineData):
                 it goes; or (x, y, turn) with the angle [rad] by which it has turned there.
             over: how long it takes.
             gait: as for ``walk``.
+
+        Raises:
+            TimelineError: for an unknown gait, a raised foot, or a point twice in a row.
         """
         return self._stepped("path()", _way_through(points), over, gait)
 
@@ -298,6 +313,7 @@ class Steps(TimelineData):
         start, gait = self.cursor, STEP_GAITS[name]
         rhythm = self._rhythm(what, way.rounds(gait), over, name)
         end = start + rhythm.over
+        self._require_length(end)
         keys: list[Key] = list(steps_of(way, gait, rhythm, start))
         if self.balance:
             sway = BalanceShift(start, end, Ease.MINIMUM_JERK, frozenset(), is_swaying=True)
@@ -310,7 +326,7 @@ class Steps(TimelineData):
             start, next_beat = self._span(1.0)
             return rhythm_for(gait, rounds, next_beat - start if self.shift_beats else None)
         start, end = self._span(over)
-        least = least_time(gait, rounds)
+        least = 2.0 * gait.rest + (rounds - 1.0 + gait.last) * gait.least_period
         if end - start < least - SAME:
             hint = "" if name == "trot" else ', or try gait="trot"'
             raise TimelineError(

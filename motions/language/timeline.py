@@ -22,6 +22,8 @@ from functools import cache
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.arguments import typed
+from go2_wbc.errors import TimelineError
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
@@ -78,6 +80,7 @@ def _nominal_feet() -> Float[np.ndarray, "4 3"]:
     return standing_feet(RobotModel())
 
 
+@typed(error=TimelineError)
 def deg(angle: float) -> float:
     """``angle`` degrees in radians."""
     return math.radians(angle)

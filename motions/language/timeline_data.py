@@ -83,6 +83,8 @@ class TimelineData:
         """Raise TimelineError for what is out of range, or a track that moves twice at once."""
         if not isinstance(self.name, str):
             raise TimelineError(f"name must be a word, got {self.name!r}")
+        if not isinstance(self.balance, bool):
+            raise TimelineError(f"balance must be True or False, got {self.balance!r}")
         for name in ("entry", "exit"):
             if not isinstance(getattr(self, name), Posture):
                 valid = ", ".join(f"Posture.{posture.name}" for posture in Posture)

@@ -14,9 +14,11 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.errors import CommandError
-from motions.music.songs import RATE, Sound, read_sound
+from motions.music.metre import bars
+from motions.music.songs import RATE, Sound, checked_metre, read_sound
 
 HOP, WINDOW = 128, 512
 """Samples from one frame to the next (5.8 ms), and of a frame (23 ms): short, to tell when a note
@@ -70,6 +72,9 @@ class Beats:
         duration: length [s] of the song.
         agreement: how regular it is: its mean correlation with itself 1 to 8 beats later, at
             most 1.
+        metre: beats of a bar, 3 for a waltz, 6 for one that is counted twice as fast; 1 where no
+            bars are known.
+        downbeat: number of the beat, from 0, on which the first bar begins.
     """
 
     tempo: float
@@ -77,20 +82,29 @@ class Beats:
     strengths: Times
     duration: float
     agreement: float
+    metre: int = 1
+    downbeat: int = 0
 
     __repr__ = brief
 
 
-def beats(path: Path | str) -> Beats:
-    """The beats of a song: a WAV, FLAC, OGG or MP3 file.
+@typed()
+def beats(path: Path | str, metre: int | None = None) -> Beats:
+    """The beats and the bars of a song: a WAV, FLAC, OGG or MP3 file.
 
     A song may be counted twice as fast or half as fast as its players did; that is no error.
 
+    Args:
+        path: the file.
+        metre: beats of a bar, 2, 3 or 4; by default 3 or 4, whichever is heard.
+
     Raises:
         CommandError: if the file is missing, no sound, longer than a quarter of an hour, silent, or
-            has no four beats or no steady ones.
+            has no four beats or no steady ones; for another metre.
         MissingDependency: without the extra ``[music]``.
     """
+    if metre is not None:
+        checked_metre(metre)
     sound, name = read_sound(path), Path(path).name
     if len(sound) < WINDOW or float(np.abs(sound).max()) < SILENCE:
         raise CommandError(f"{name} is silent: there is no beat in it")
@@ -103,12 +117,15 @@ def beats(path: Path | str) -> Beats:
     strengths = _near(onsets, np.minimum(frames, len(onsets) - 1))
     if len(times) < LEAST_BEATS:
         raise CommandError(f"{name} has {len(times)} beats, a song has {LEAST_BEATS} or more")
+    in_a_bar, downbeat = bars(sound, times, metre)
     return Beats(
         tempo=60.0 * (len(times) - 1) / float(times[-1] - times[0]),
         times=times,
         strengths=strengths / max(float(strengths.max()), 1e-9),
         duration=len(sound) / RATE,
         agreement=agreement,
+        metre=in_a_bar,
+        downbeat=downbeat,
     )
 
 

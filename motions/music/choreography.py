@@ -6,6 +6,7 @@ ahead of the song by that much, and what is on the beat is what is seen.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -16,7 +17,7 @@ from go2_wbc.errors import CommandError, MotionInfeasible, unknown_name
 from motions.feasibility.check import CheckedMotion, FeasibilityChecker
 from motions.language.timeline import Timeline
 from motions.music.beat_tracking import Beats
-from motions.music.dance_moves import MOVES, Accent, Move
+from motions.music.dance_moves import MOVES, WALTZ, Accent, Move
 
 LEAD = 0.006
 """How far [s] a dance is written ahead of the song. On the tuning seeds 0 to 9 the trunk turned
@@ -35,6 +36,8 @@ SLACK = 2.0
 """How many moves a dance may be behind that until its end; as many more are aimed for."""
 RECENT = 4
 """Moves that are not chosen again to fill a gap, where there are others."""
+TRIPLE = 3
+"""Metre of a waltz."""
 UNEVEN = 0.6
 """A pulse that comes sooner than this share of the usual after another is none."""
 ATTEMPTS = 12
@@ -59,39 +62,83 @@ class Dance:
         accents: what shall happen on the beats, by pulses of the dance.
         pulses: instants [s] of the pulses in the song; the first one is counted in, without an
             accent.
+        bar: pulses of a bar.
+        downbeat: number of the first pulse that begins one.
     """
 
     timeline: Timeline
     moves: tuple[PlacedMove, ...]
     accents: tuple[Accent, ...]
     pulses: Float[np.ndarray, " n"]
+    bar: int = 1
+    downbeat: int = 0
 
     def time(self, accent: Accent) -> float:
         """When [s] in the song ``accent`` shall happen."""
         return float(self.pulses[accent.pulse])
 
+    def named(self, times: Float[np.ndarray, " m"]) -> list[str]:
+        """The move under way at each instant [s] of the song; before the first, the dance."""
+        starts = [self.timeline.clock.at(item.pulse - 0.5) for item in self.moves]
+        names = [self.timeline.name, *(item.move.name for item in self.moves)]
+        return [names[row] for row in np.searchsorted(starts, times, side="right")]
 
-def pulses_of(found: Beats) -> Float[np.ndarray, " n"]:
-    """The instants [s] of a song on which a dance has its accents.
 
-    Every beat, or every second, fourth ... of a fast song; of these the ones with the strongest
-    notes. So a song that was counted twice as fast as it is played is danced on its beats.
+@dataclass(frozen=True, slots=True)
+class Pulses:
+    """The instants of a song on which a dance has its accents.
+
+    Attributes:
+        times: instants [s].
+        bar: pulses of a bar.
+        downbeat: number of the first pulse that begins one.
     """
-    usual = float(np.median(np.diff(found.times)))
-    every = 1
+
+    times: Float[np.ndarray, " n"]
+    bar: int
+    downbeat: int
+
+    @property
+    def usual(self) -> float:
+        """The median distance [s] of two."""
+        return float(np.median(np.diff(self.times)))
+
+    def admits(self, pulse: int, length: int) -> bool:
+        """Whether a move of ``length`` pulses may begin on ``pulse``.
+
+        One of a bar or more begins with a bar; a shorter one stays within its bar, and one of two
+        pulses begins on the first or third.
+        """
+        place = (pulse - self.downbeat) % self.bar
+        is_inside = place % length == 0 and place + length <= self.bar
+        return is_inside if length < self.bar else place == 0
+
+
+def pulses_of(found: Beats) -> Pulses:
+    """The instants of a song on which a dance has its accents.
+
+    Every beat, or every second, fourth ... of a fast song, of a waltz every third; those on which
+    bars begin, and of these the ones with the strongest notes. So a song that was counted twice as
+    fast as it is played is danced on its beats.
+    """
+    usual, every = float(np.median(np.diff(found.times))), 1
     while every * usual < SHORTEST_PULSE:
-        every *= 2
-    strength = [float(np.mean(found.strengths[first::every])) for first in range(every)]
-    chosen = found.times[int(np.argmax(strength)) :: every]
-    kept = [float(time) for time in chosen[:1]]
-    for time in chosen[1:]:
-        if time - kept[-1] > UNEVEN * every * usual:
+        every *= found.metre if every == 1 and found.metre == TRIPLE else 2
+    shared = math.gcd(every, found.metre)
+    firsts = [k for k in range(every) if (k - found.downbeat) % shared == 0]
+    strength = [float(np.mean(found.strengths[first::every])) for first in firsts]
+    first = firsts[int(np.argmax(strength))]
+    kept: list[float] = []
+    for time in found.times[first::every]:
+        if not kept or time - kept[-1] > UNEVEN * every * usual:
             kept.append(float(time))
-    return np.array(kept)
+    bar = found.metre // shared
+    begins = [k for k in range(bar) if (first + k * every - found.downbeat) % found.metre == 0]
+    return Pulses(np.array(kept), bar, begins[0])
 
 
 def compose(found: Beats, seed: int, names: Sequence[str] = ()) -> Dance:
-    """A dance on the beats of a song.
+    """A dance on the beats of a song; its moves begin with the bars, where these are known.
 
     Args:
         found: the beats.
@@ -101,8 +148,8 @@ def compose(found: Beats, seed: int, names: Sequence[str] = ()) -> Dance:
     Raises:
         CommandError: for an unknown move, or a song too short for a dance.
     """
-    moves = _named(names)
     pulses = _playable(pulses_of(found))
+    moves = _moves(names, pulses)
     wanted = MOVES_PER_SECOND * min(found.duration, LONGEST) + SLACK
     return _written(pulses, _chosen(pulses, moves, wanted, np.random.default_rng(seed)), seed)
 
@@ -117,13 +164,13 @@ def feasible_dance(
         MotionInfeasible: if no order of these moves is feasible.
     """
     dance = compose(found, seed, names)
-    pulses, rng = dance.pulses, np.random.default_rng([seed, 1])
+    pulses, rng = Pulses(dance.pulses, dance.bar, dance.downbeat), np.random.default_rng([seed, 1])
     checked = checker.evaluate(dance.timeline)
     for _ in range(ATTEMPTS):
         if checked.report.ok:
             return dance, checked
         times = [finding.time for finding in checked.report.failures]
-        moves = _replaced(dance, times, _named(names), rng)
+        moves = _replaced(dance, times, _moves(names, pulses), rng)
         if moves == list(dance.moves):
             break
         dance = _written(pulses, moves, seed)
@@ -131,54 +178,60 @@ def feasible_dance(
     raise MotionInfeasible(dance.timeline.name, checked.report.failures)
 
 
-def _named(names: Sequence[str]) -> list[Move]:
+def _moves(names: Sequence[str], pulses: Pulses) -> list[Move]:
+    """Those named, else all that suit the bars."""
     for name in names:
         if name not in MOVES:
             raise CommandError(unknown_name("move", name, MOVES))
-    return [MOVES[name] for name in names or MOVES]
+    suited = (name for name in MOVES if pulses.bar == TRIPLE or name not in WALTZ)
+    return [MOVES[name] for name in names or suited]
 
 
-def _playable(pulses: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
+def _playable(pulses: Pulses) -> Pulses:
     """The pulses from the first on halfway after which a move may start; that is the count-in."""
-    pulses = pulses[pulses < LONGEST]
-    middles = 0.5 * (pulses[1:] + pulses[:-1])
-    late = (pulses[:-1] >= LEAD) & (middles - LEAD >= GET_READY)
-    kept = pulses[int(np.argmax(late)) :] if late.any() else pulses[:0]
+    times = pulses.times[pulses.times < LONGEST]
+    middles = 0.5 * (times[1:] + times[:-1])
+    late = (times[:-1] >= LEAD) & (middles - LEAD >= GET_READY)
+    first = int(np.argmax(late)) if late.any() else len(times)
+    kept = times[first:]
     if len(kept) < LEAST_PULSES:
         raise CommandError(
             f"the song is too short for a dance: it has room for {max(len(kept) - 1, 0)} accents, "
             f"{LEAST_PULSES - 1} are needed"
         )
-    return kept
+    return Pulses(kept, pulses.bar, (pulses.downbeat - first) % pulses.bar)
 
 
 def _chosen(
-    pulses: Float[np.ndarray, " n"],
-    moves: Sequence[Move],
-    wanted: float,
-    rng: np.random.Generator,
+    pulses: Pulses, moves: Sequence[Move], wanted: float, rng: np.random.Generator
 ) -> list[PlacedMove]:
     """Moves until the song ends, about as many as ``wanted``.
 
-    Each comes once before one comes again, none twice in a row; long ones when there is time.
+    Each comes once before one comes again, none twice in a row; long ones when there is time. A
+    pulse on which none may begin is a rest.
     """
-    pulse, per_pulse = float(np.median(np.diff(pulses))), wanted / len(pulses)
+    pulse, count = pulses.usual, len(pulses.times)
+    per_pulse = wanted / count
     placed: list[PlacedMove] = []
     bag: list[Move] = []
     now = 1
-    while now < len(pulses):
+    while now < count:
         if not bag:
             bag = [moves[i] for i in rng.permutation(len(moves))]
         last = placed[-1].move if placed else None
-        until = min((len(placed) + 1 + SLACK) / per_pulse, len(pulses))
-        fits = [m for m in bag if m is not last and now + m.pulses(pulse) <= until]
-        move = next(iter(fits), None)
-        if move is None:
-            move = _shortest(moves, placed, pulse, rng)
-            if now + move.pulses(pulse) > len(pulses):
-                break
-        else:
+        until = min((len(placed) + 1 + SLACK) / per_pulse, count)
+        admitted = [m for m in moves if pulses.admits(now, m.pulses(pulse))]
+        fits = (m for m in bag if m in admitted and m is not last)
+        move = next((m for m in fits if now + m.pulses(pulse) <= until), None)
+        if move is not None:
             bag.remove(move)
+        elif admitted:
+            move = _shortest(admitted, placed, pulse, rng)
+        if move is None:
+            now += 1
+            continue
+        if now + move.pulses(pulse) > count:
+            break
         placed.append(PlacedMove(move, now))
         now += move.pulses(pulse)
     if not placed:
@@ -222,11 +275,12 @@ def _span(dance: Dance, item: PlacedMove, pulse: float) -> tuple[float, float]:
     return clock.at(item.pulse - 0.5), clock.at(item.pulse + item.move.pulses(pulse) - 0.5)
 
 
-def _written(pulses: Float[np.ndarray, " n"], placed: Sequence[PlacedMove], seed: int) -> Dance:
-    pulse = float(np.median(np.diff(pulses)))
-    line = Timeline(name=f"dance {seed}").on_beats(pulses - LEAD).at(0.5)
+def _written(pulses: Pulses, placed: Sequence[PlacedMove], seed: int) -> Dance:
+    pulse = pulses.usual
+    line = Timeline(name=f"dance {seed}").on_beats(pulses.times - LEAD)
     accents: list[Accent] = []
     for item in placed:
-        line = item.move.written(line, pulse)
+        line = item.move.written(line.at(item.pulse - 0.5), pulse)
         accents += [Accent(item.pulse + a.pulse, a.part, a.sign) for a in item.move.accents(pulse)]
-    return Dance(line, tuple(placed), tuple(accents), pulses)
+    moves = tuple(placed)
+    return Dance(line, moves, tuple(accents), pulses.times, pulses.bar, pulses.downbeat)

@@ -137,6 +137,13 @@ def _swing(name: str, channel: str, size: float) -> Strokes:
     return Strokes(name, ({channel: size}, {channel: -size}))
 
 
+def _waltz(name: str, **far: float) -> Strokes:
+    """Down and aside on ONE, up on two, and a little down again on three."""
+    return Strokes(
+        name, ({"z": -0.035, **far}, {"z": 0.012}, {"z": -0.012, **dict.fromkeys(far, 0.0)})
+    )
+
+
 MOVES: Mapping[str, Move] = {
     move.name: move
     for move in (
@@ -157,7 +164,13 @@ MOVES: Mapping[str, Move] = {
         _swing("twist", "yaw", deg(10)),
         _swing("rodeo", "pitch", deg(-7)),
         Strokes("shimmy", ({"yaw": deg(8), "roll": deg(5)}, {"yaw": deg(-8), "roll": deg(-5)})),
+        _waltz("waltz_left", y=0.03, roll=deg(-4)),
+        _waltz("waltz_right", y=-0.03, roll=deg(4)),
+        _waltz("waltz_ahead", x=0.025),
+        _waltz("waltz_turn", yaw=deg(9)),
         *(Taps(f"tap_{foot}", foot) for foot in ("FL", "FR", "RL", "RR")),
     )
 }
 """The moves, by name. Sizes are own choices, well inside of what the check allows."""
+WALTZ = tuple(name for name in MOVES if name.startswith("waltz"))
+"""Those that take a bar of three."""

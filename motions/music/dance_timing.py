@@ -50,7 +50,6 @@ def danced(recorded: TruthRecording, dance: Dance) -> DancedAccents:
 
     Args:
         recorded: the run, from the instant on at which the song began.
-        dance: what was played.
     """
     time = recorded.time - recorded.time[0]
     tracks = _tracks(recorded)

@@ -29,8 +29,8 @@ LEAD_IN = 0.5
 """Silence [s] before the first beat of a click track."""
 CLICK_PITCH, ACCENT_PITCH = 1000.0, 1500.0
 """Pitch [Hz] of a click, and of the first one of a bar."""
-BAR = 4
-"""Beats of a bar."""
+METRES = (2, 3, 4)
+"""Beats that a bar may have: 3 are a waltz's."""
 LOUDNESS = 0.8
 """Greatest amplitude of a song, of 1."""
 DRIFT = 0.01
@@ -127,34 +127,48 @@ class Song:
         return write_atomically(checked_output(path, [".wav"]), self.wav())
 
 
-def click_track(bpm: float, seconds: float) -> Song:
-    """A metronome: a click on every beat, a higher one on the first of four.
+def click_track(bpm: float, seconds: float, metre: int = 4) -> Song:
+    """A metronome: a click on every beat, a higher one on the first of each bar.
 
     Raises:
         TimelineError: for a tempo or a length that is not a number greater than 0.
+        CommandError: for a bar that has not 2, 3 or 4 beats.
     """
+    checked_metre(metre)
     positive("seconds", seconds)
     beats = np.arange(LEAD_IN, seconds - 0.1, 60.0 / positive("bpm", bpm))
     sound = np.zeros(round(seconds * RATE))
     for number, beat in enumerate(beats.tolist()):
-        pitch = CLICK_PITCH if number % BAR else ACCENT_PITCH
+        pitch = CLICK_PITCH if number % metre else ACCENT_PITCH
         _add(sound, beat, _tone(pitch, 0.03, decay=150.0))
     return Song(f"clicks at {bpm:g} beats/min", _levelled(sound), RATE, beats)
 
 
-def made_song(bpm: float, seconds: float, seed: int) -> Song:
+def checked_metre(metre: int) -> int:
+    """How many beats a bar has, if one can have so many.
+
+    Raises:
+        CommandError: otherwise.
+    """
+    if metre not in METRES:
+        raise CommandError(f"a bar has 2, 3 (a waltz) or 4 beats, got metre {metre!r}")
+    return metre
+
+
+def made_song(bpm: float, seconds: float, seed: int, metre: int = 4) -> Song:
     """Drums, bass and chords; ``seed`` chooses the patterns, the key and how it is played.
 
     The tempo drifts by up to 1 %, off-beats may swing, and no note is played exactly in its place;
-    the beats are those of the score.
+    the beats are those of the score, and its first bar begins on the first one.
 
     Raises:
         TimelineError: for a tempo or a length that is not a number greater than 0.
+        CommandError: for a bar that has not 2, 3 or 4 beats.
     """
     rng = np.random.default_rng(seed)
     beats = _score(positive("bpm", bpm), positive("seconds", seconds), rng)
     sound = np.zeros(round(seconds * RATE))
-    player = _Player(sound, beats, rng)
+    player = _Player(sound, beats, rng, checked_metre(metre))
     player.drums()
     player.bass_and_chords()
     sound += 0.003 * rng.standard_normal(len(sound))
@@ -170,9 +184,17 @@ def _score(bpm: float, seconds: float, rng: np.random.Generator) -> Float[np.nda
     return beats[beats < seconds - 0.1]
 
 
-KICKS = ((0, 2), (0, 2, 2.5), (0, 1, 2, 3), (0, 0.5, 2), (0, 1.5, 2))
-"""Beats of a bar on which the bass drum may play; one of these patterns."""
-SNARES = ((1, 3), (1, 3), (1, 3, 3.5), (2,))
+KICKS = {
+    2: ((0,), (0, 1), (0, 1.5)),
+    3: ((0,), (0,), (0, 2.5), (0, 1.5)),
+    4: ((0, 2), (0, 2, 2.5), (0, 1, 2, 3), (0, 0.5, 2), (0, 1.5, 2)),
+}
+"""Beats of a bar on which the bass drum may play, by metre; one of these patterns."""
+SNARES = {
+    2: ((1,), (1, 1.5)),
+    3: ((1, 2), (1, 2), (2,), (1, 2, 2.5)),
+    4: ((1, 3), (1, 3), (1, 3, 3.5), (2,)),
+}
 HATS = (0.5, 1.0, 0.5, 0.25)
 """Beats from one stroke of the cymbal to the next."""
 CHORDS = ((0, 5, 7, 0), (0, 9, 5, 7), (0, 7, 9, 5), (9, 5, 0, 7), (2, 7, 0, 0))
@@ -186,29 +208,31 @@ class _Player:
     sound: Sound
     beats: Float[np.ndarray, " k"]
     rng: np.random.Generator
+    metre: int
 
     def drums(self) -> None:
-        rng = self.rng
-        kicks, snares = KICKS[rng.integers(len(KICKS))], SNARES[rng.integers(len(SNARES))]
+        rng, drums, claps = self.rng, KICKS[self.metre], SNARES[self.metre]
+        kicks, snares = drums[rng.integers(len(drums))], claps[rng.integers(len(claps))]
         hats, swing = HATS[rng.integers(len(HATS))], rng.uniform(0.0, SWING)
         hat_gain = rng.uniform(0.05, 0.25)
-        for bar in range(0, len(self.beats), BAR):
+        for bar in range(0, len(self.beats), self.metre):
             for place in kicks:
                 self._play(bar + place, _kick(), rng.uniform(0.8, 1.0), swing)
             for place in snares:
                 self._play(bar + place, _noise(rng, 0.15, 25.0), rng.uniform(0.3, 0.5), swing)
-            for place in np.arange(0.0, BAR, hats).tolist():
+            for place in np.arange(0.0, self.metre, hats).tolist():
                 self._play(bar + place, _noise(rng, 0.05, 90.0), hat_gain, swing)
 
     def bass_and_chords(self) -> None:
         rng = self.rng
         key, roots = 110.0 * 2 ** (rng.integers(-5, 6) / 12), CHORDS[rng.integers(len(CHORDS))]
-        line = tuple(rng.choice([0, 0.5, 1, 1.5, 2, 2.5, 3, 3.5], 3, replace=False)) + (0,)
-        for number, bar in enumerate(range(0, len(self.beats), BAR)):
+        places = 0.5 * np.arange(2 * self.metre)
+        line = tuple(rng.choice(places, 3, replace=False)) + (0,)
+        for number, bar in enumerate(range(0, len(self.beats), self.metre)):
             root = key * 2 ** (roots[number % len(roots)] / 12)
             for place in line:
                 self._play(bar + place, _tone(root / 2, 0.3, decay=6.0), 0.5, 0.0)
-            length = min(self._when(bar + BAR) - self._when(bar), 4.0)
+            length = min(self._when(bar + self.metre) - self._when(bar), 4.0)
             chord = sum(_tone(root * 2 ** (step / 12), length, decay=1.0) for step in (0, 4, 7))
             self._play(bar, np.asarray(chord), 0.12, 0.0)
 

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.interpolate import PPoly
 
+from go2_wbc.arguments import typed
 from go2_wbc.brief import inline_html
 from go2_wbc.contacts import TIE, ContactPhase, ContactSchedule
 from go2_wbc.errors import MotionError
@@ -196,10 +197,12 @@ class CompiledPlan(MotionPlan):
         """Whether fewer than three feet stand at any time; see ``MotionPlan.is_dynamic``."""
         return bool((self.contacts.modes.sum(axis=1) < LEAST_FEET).any())
 
+    @typed()
     def at(self, t: float) -> Reference:
         """The reference at ``t``; see ``MotionPlan.at``."""
         return Reference.of_row(self.row_at(t))
 
+    @typed(late=True)
     def row_at(self, t: float) -> Float[np.ndarray, " size"]:
         """Its numbers, by a kernel; see ``MotionPlan.row_at``."""
         target, span = self._asked.at(t), self._span_at(t)
@@ -222,6 +225,7 @@ class CompiledPlan(MotionPlan):
             table[(changes > span.start - TIE) & (changes < span.end + TIE)] = never
         return table
 
+    @typed(late=True)
     def samples(self, times: Float[np.ndarray, " n"]) -> PlanSamples:
         """What the references at ``times`` ask for; ``at`` gives the same one by one."""
         values = self.curves(np.clip(times, 0.0, self.duration))

@@ -49,7 +49,6 @@ def compile_quasi_static(
     rest.
 
     Args:
-        timeline: what to compile.
         model: of the robot; compiling uses its data, so it must not be that of a control loop that
             runs in another thread.
         p_feet: where the feet's centres stand at first [m], by default below the hips; the trunk

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.interpolate import PPoly
 
+from go2_wbc.arguments import typed
 from go2_wbc.contacts import ContactSchedule
 from go2_wbc.curves import Ease
 from go2_wbc.errors import PlanNotFound, TimelineError
@@ -46,6 +47,7 @@ Broken = Callable[[CompiledPlan], Float[np.ndarray, " k"]]
 """Instants [s] at which a plan breaks a limit."""
 
 
+@typed(error=TimelineError)
 def compile_timeline(
     timeline: Timeline,
     model: RobotModel,
@@ -57,7 +59,6 @@ def compile_timeline(
     """The plan of ``timeline``, in the frame of the motion.
 
     Args:
-        timeline: what to compile.
         model: of the robot; compiling uses its data, so it must not be that of a control loop that
             runs in another thread.
         p_feet: where the feet's centres stand at first [m], by default below the hips; the trunk

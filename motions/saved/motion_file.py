@@ -9,6 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import MotionFileError, TimelineError, unknown_name
 from go2_wbc.files import checked_output, write_atomically
 from motions.authoring import Motion
@@ -52,6 +53,7 @@ _JOINTS: Final = 3
 """Of a leg."""
 
 
+@typed("path")
 def save_motion(motion: object, path: Path | str) -> Path:
     """Write what was authored to a ``.json`` file; ``load_motion(path)`` reads it.
 

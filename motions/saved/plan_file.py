@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import MotionFileError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.robot.model import RobotModel, fingerprint
@@ -24,6 +25,7 @@ _DESCRIPTION: Final = "description"
 _ROBOT, _PLAN = "robot", "plan"
 
 
+@typed("path", "model")
 def save_plan(plan: object, path: Path | str, *, model: RobotModel | None = None) -> Path:
     """Write a compiled plan to a ``.plan`` file; ``load_plan(path)`` reads it.
 
@@ -62,6 +64,7 @@ def save_plan(plan: object, path: Path | str, *, model: RobotModel | None = None
     return write_atomically(target, stream.getvalue())
 
 
+@typed()
 def load_plan(path: Path | str, *, model: RobotModel | None = None) -> CompiledPlan:
     """The plan that ``save_plan`` wrote.
 
@@ -101,8 +104,8 @@ def _arrays_of(file: Path) -> dict[str, np.ndarray]:
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
-    except (*UNREADABLE, KeyError) as error:
-        raise MotionFileError(f"{file} is damaged, cut short, or no saved plan") from error
+    except (*UNREADABLE, KeyError):  # NumPy's advice would be to unpickle it: say nothing of that
+        raise MotionFileError(f"{file} is damaged, cut short, or no saved plan") from None
 
 
 def _require_sane(plan: CompiledPlan) -> None:

@@ -133,7 +133,6 @@ class Decoder:
 
         Args:
             value: what JSON says of it: an object.
-            kind: the class.
             where: what messages call it.
             ready: fields that were read before.
 

@@ -1,7 +1,5 @@
 """Benchmarks under test run in this process and write where the test says."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

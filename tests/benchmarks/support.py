@@ -1,7 +1,5 @@
 """Scenarios that give known values, for the tests of the machinery around them."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 

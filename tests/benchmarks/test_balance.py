@@ -1,7 +1,5 @@
 """A sample of every row of ``balance``, and that what judges a fall sees one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from pathlib import Path

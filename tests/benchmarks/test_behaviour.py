@@ -1,7 +1,5 @@
 """What the rows of ``behaviour`` measure."""
 
-from __future__ import annotations
-
 from contextlib import closing
 from dataclasses import replace
 
@@ -11,7 +9,6 @@ import pytest
 from benchmarks import robots
 from benchmarks.demo_sequence import CRITERIA, StepCheck
 from benchmarks.high_five import highest_window, largest_slip, longest_run
-from benchmarks.pushes import IMPULSE_STEP, largest_impulse
 from benchmarks.robots import plant_of
 from controller.demo.report import StepResult
 from controller.demo.run import DemoProgress
@@ -29,23 +26,6 @@ def test_plants_of_trials_differ_within_their_ranges() -> None:
     with closing(plant_of(Trial(0), 4100)) as one, closing(plant_of(Trial(1), 4100)) as other:
         assert one.read().rpy[2] != other.read().rpy[2]
     assert (robots.FRICTION_RANGE, robots.MASS_RANGE) == ((0.6, 1.0), (0.95, 1.05))
-
-
-@pytest.mark.parametrize(
-    ("greatest", "first", "found"),
-    [
-        (14.0, 14.0, 14.0),
-        (15.0, 14.0, 14.0),
-        (100.0, 14.0, 14.0 + IMPULSE_STEP),
-        (13.0, 14.0, 12.0),
-        (0.0, 14.0, 0.0),
-        (1.0, 3.0, 1.0),
-    ],
-)
-def test_the_search_ends_below_the_first_impulse_that_is_not_survived(
-    greatest: float, first: float, found: float
-) -> None:
-    assert largest_impulse(lambda impulse: impulse <= greatest, first) == found
 
 
 def test_the_longest_run_is_found() -> None:

@@ -1,28 +1,20 @@
 """Which benchmarks of the bridges a name stands for, and what is said when one cannot run."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.bridges.command import STUDIES, TESTED
+from benchmarks.bridges.command import STUDIES
 from benchmarks.study import chosen_studies
 from controller.cli.common import ExitCode
-from go2_wbc.errors import CommandError
 
 
 @pytest.mark.parametrize("name", ["", "ros2", "unitree", *(study.name for study in STUDIES)])
 def test_a_name_stands_for_a_group_or_a_scenario_and_none_for_everything(name: str) -> None:
     expected = tuple(study for study in STUDIES if study.name.startswith(name))
     assert chosen_studies(STUDIES, [name] if name else []) == expected
-
-
-def test_an_unknown_name_is_answered_with_the_valid_ones() -> None:
-    with pytest.raises(CommandError, match=r"ros3.*ros2.*unitree-drive"):
-        chosen_studies(STUDIES, ["ros3"])
 
 
 def test_the_metrics_are_listed_without_the_extras(
@@ -45,15 +37,3 @@ def test_without_the_extra_the_line_that_installs_it_is_named(
     assert 'pip install "go2-wbc[unitree]"' in complaint
     assert "Traceback" not in complaint
     assert not results_folder.exists()
-
-
-def test_metric_names_are_unique() -> None:
-    names = [metric.name for study in STUDIES for metric in study.metrics]
-    assert len(names) == len(set(names))
-
-
-def test_what_tests_do_now_is_told_with_the_test(capsys: pytest.CaptureFixture[str]) -> None:
-    for name, file in TESTED.items():
-        assert main(["bridges", name]) == ExitCode.USAGE
-        assert f"pytest {file}" in capsys.readouterr().err
-        assert (Path(__file__).resolve().parents[2] / file).is_file()

@@ -1,7 +1,5 @@
 """Rest and combined worlds: what a trial counts."""
 
-from __future__ import annotations
-
 import pytest
 
 from benchmarks import combined, locomotion

@@ -1,7 +1,5 @@
 """``python -m benchmarks``: what is run, what is printed and written, which exit code."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -140,12 +138,12 @@ def test_list_names_every_scenario_and_threshold(capsys: pytest.CaptureFixture[s
     assert main(["behaviour", "--list"]) == ExitCode.OK
     out = capsys.readouterr().out
     assert all(scenario.name in out.splitlines() for scenario in STUDIES)
-    assert "<= 0.025 m/s" in out
+    assert "<= 20 mm" in out
     assert max(map(len, out.splitlines())) <= WIDTH
 
 
 def test_an_unknown_scenario_is_a_usage_error_that_lists_the_valid_ones() -> None:
-    with pytest.raises(CommandError, match=r"unknown scenario 'gallop'.*high-five.*trot"):
+    with pytest.raises(CommandError, match=r"unknown scenario 'gallop'.*goals.*high-five"):
         chosen_studies(STUDIES, ["gallop"])
     assert main(["behaviour", "--rows", "gallop"]) == ExitCode.USAGE
 
@@ -163,3 +161,13 @@ def test_a_trial_on_sensors_is_the_same_trial_with_another_plant() -> None:
         np.testing.assert_array_equal(ideal.truth().q, plant.truth().q)
         assert plant.read().time == plant.truth().time
         assert not np.array_equal(plant.read().q, plant.truth().q)
+
+
+@pytest.mark.parametrize("words", ["border", "envelopes", "probability --motions 1"])
+def test_a_folder_that_cannot_be_made_is_told(
+    words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    rows = str(tmp_path / "file" / "in" / "rows.sqlite")
+    assert main([*words.split(), "--rows", rows]) == ExitCode.USAGE
+    assert "cannot make the folder" in capsys.readouterr().err

@@ -1,7 +1,5 @@
 """The benchmark of dances judges with the beats that a song was made with, not with those heard."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

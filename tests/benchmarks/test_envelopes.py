@@ -1,7 +1,5 @@
 """The measured envelopes: how a bound is found, and what is stored."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Broken parts: what a trial counts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """The benchmark of the feasibility check: the command, its judgement, its cache of physics."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

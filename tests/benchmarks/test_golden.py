@@ -1,7 +1,5 @@
 """Golden runs: what is equal, what is told of a difference, and that each stage is looked at."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """What a motion that says True must have done, in truth."""
 
-from __future__ import annotations
-
 from typing import Any, cast
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The benchmark of locomotion: what a recorded run is worth."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Compiled code against its own Python, call by call, while a robot is driven."""
 
-from __future__ import annotations
-
 from benchmarks.plain import NEAR, difference, every_call_compared
 from controller import GO2Controller
 from go2_wbc.algebra import active_set

@@ -1,7 +1,5 @@
 """The stated chance: which motion is played in which world, the fit, what is stored and shown."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -22,7 +20,7 @@ from benchmarks.probability import (
     store,
 )
 from benchmarks.probability_fit import Sample, _loss, calibration, fit
-from benchmarks.probability_runs import WORLDS, exam, mixed, runs
+from benchmarks.probability_runs import PAYLOAD, WORLDS, exam, mixed, runs, world_of
 from benchmarks.validation_set.drawing import TEST, TRAIN
 from controller.sweeps.rows import Row
 from motions.feasibility.probability import ProbabilityModel, Rise
@@ -183,3 +181,10 @@ def test_no_family_comes_again_in_a_stratum_before_all_have_come() -> None:
 def test_mixing_loses_no_motion() -> None:
     asked = exam()
     assert sorted(q.name for q in mixed(asked[:50])) == sorted(q.name for q in asked[:50])
+
+
+def test_worlds_are_within_the_stated_ranges_and_all_different() -> None:
+    worlds = [world_of(seed) for seed in range(200)]
+    assert all(0.3 <= world.friction <= 1.0 for world in worlds)
+    assert all(0.0 <= world.payload <= PAYLOAD[1] for world in worlds)
+    assert len(set(worlds)) == len(worlds)

@@ -1,7 +1,5 @@
 """The benchmark of answers counts what it names, and nothing is counted twice."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Stairs, blocks and reversals: what a trial counts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Random calls: a sample of them, and that the judge notices what is wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 

@@ -1,7 +1,5 @@
 """The speed benchmark measures what it names; how fast that is, no test says."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """An interrupted run goes on where it ended; what does not fit is refused."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +18,7 @@ from tests.benchmarks.support import fake, measure_well
 
 TROT = Study("trot", {"": (("a", "", ""), ("b", "", ""))}, measure_well, prefix="")
 FIRST = TrialResult({"a": 0.1 + 0.2, "b": math.inf}, {"b": "it fell"}, "said no", {"a": "x"})
-SECOND = TrialResult({"a": math.nan, "b": -0.0}, not_asked={"a": "no plan"})
+SECOND = TrialResult({"a": math.nan, "b": -0.0}, notes={"a": "no plan"})
 
 
 class Interrupted:
@@ -104,22 +102,6 @@ def test_trials_under_other_settings_are_refused_with_what_differs(
         opened(folder, [TROT], resume=True),
     ):
         pass
-
-
-def test_other_settings_are_a_usage_error_that_keeps_the_trials(
-    only: Only,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    results_folder: Path,
-) -> None:
-    only(fake())
-    main(["behaviour", "--seeds", "1"])
-    other = {**settings_header(), "python": "2.7"}
-    with monkeypatch.context() as later:
-        later.setattr("benchmarks.store.settings_header", lambda: other)
-        assert main(["behaviour", "--seeds", "1", "--resume"]) == ExitCode.USAGE
-    assert "now 2.7" in capsys.readouterr().err
-    assert len(read_sweep(results_folder / "behaviour" / "fake.sqlite").rows) == 1
 
 
 def test_a_file_of_something_else_is_neither_read_nor_removed(tmp_path: Path) -> None:

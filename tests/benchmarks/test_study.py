@@ -1,7 +1,5 @@
 """Every trial is run once, in whatever process, and one that dies costs no other its result."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

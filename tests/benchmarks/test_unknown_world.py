@@ -1,7 +1,5 @@
 """What the robot is not told of, and other people's robots: what a run counts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

@@ -1,7 +1,5 @@
 """A robot in MuJoCo under a controller, which most tests of this folder ask for."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest
@@ -10,11 +8,6 @@ from controller import GO2Controller
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline
 from tests.controller.plants import WatchedPlant
-
-
-@pytest.fixture(scope="session")
-def model() -> RobotModel:
-    return RobotModel()
 
 
 @pytest.fixture(scope="session")

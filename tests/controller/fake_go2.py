@@ -3,8 +3,7 @@
 What is called is the real ``GO2Controller``; only how a call is carried out is not, nor the pilot.
 """
 
-from __future__ import annotations
-
+import logging
 import math
 from collections.abc import Callable, Mapping
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from controller.go2_controller import GO2Controller
 from controller.modes import Measurements, Mode, Outcome
+from controller.pacing import LogOnce
 from controller.telemetry import Telemetry
 from go2_wbc.errors import Go2WbcError, ModeError
 from go2_wbc.motion_plan import MotionPlan
@@ -66,7 +66,7 @@ class FakeGo2(GO2Controller):
         self._refusals, self._errors = dict(refusals or {}), dict(errors or {})
         self._falls_in = falls_in
         self._the_mode, self._last, self._closed = Mode.LYING, Outcome(True, "", 0.0), False
-        self._pilot, self.limits = self, "what it is told"
+        self._pilot, self._clipped = self, LogOnce(logging.getLogger(__name__))
         self._position, self._speed, self._time = np.zeros(2), 0.0, 0.0
         self._samples: list[tuple[float, float, float, float, float, bool]] = []
         self._telemetry = Telemetry(RobotModel(), 1)
@@ -78,6 +78,9 @@ class FakeGo2(GO2Controller):
             raise ModeError(f"move() needs walking mode, not {self._the_mode.value}")
         self._speed = self._share * command.linear_x
         return command
+
+    def excess(self, _command: VelocityCommand) -> tuple[int, str]:
+        return 0, ""
 
     def wait(self, seconds: float) -> None:
         self._do("wait", seconds)

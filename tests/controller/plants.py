@@ -1,7 +1,5 @@
 """Plants that can be watched and made to fail, a QP that cannot be solved, threads, and Ctrl-C."""
 
-from __future__ import annotations
-
 import itertools
 import signal
 import threading

@@ -1,13 +1,11 @@
 """A motion is done if it was near its plan, ended there, and held feet up on the average."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import pytest
 
-from controller.acceptance import PAW_TOLERANCE, Acceptance, are_within, arrival, off_plan
-from controller.modes import Aborted
+from controller.acceptance import PAW_TOLERANCE, Acceptance, arrival, off_plan
+from controller.modes import Aborted, are_within, told
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import HeldFoot, MotionPlan, Posture
 from go2_wbc.reference import Reference
@@ -66,7 +64,9 @@ def test_a_foot_that_was_too_low_is_told_with_what_was_measured() -> None:
     held = Acceptance(Holding((FIRST, SECOND)), StillPlant())
     held.note(raised(Leg.FR, 0.3), 1.5)
     held.note(raised(Leg.FL, 0.2 - PAW_TOLERANCE - CENTIMETRE), 2.7)
-    with pytest.raises(Aborted, match=r"holding held no paw at its height: .*in second") as told:
+    with pytest.raises(
+        Aborted, match=r"its height: mean paw height in second \[m\] 0.16, at least 0.17$"
+    ) as told:
         held.with_held_feet({})
     assert told.value.measured["mean paw height in first [m]"] == pytest.approx(0.3)
     assert told.value.measured["mean paw height in second [m]"] == pytest.approx(0.16)
@@ -81,7 +81,7 @@ def test_a_plan_that_holds_no_foot_is_not_measured() -> None:
 @pytest.mark.parametrize(
     ("deviation", "standing", "solved"),
     [
-        (Deviation(place=0.02, attitude=0.05, joints=0.0), True, True),
+        (Deviation(place=0.02, attitude=0.05, joints=None), True, True),
         (Deviation(place=0.04, attitude=0.12, joints=0.0), False, True),
         (Deviation(place=0.06, attitude=0.0, joints=0.0), False, False),
         (Deviation(place=0.0, attitude=0.15, joints=0.0), False, False),
@@ -91,7 +91,9 @@ def test_a_plan_that_holds_no_foot_is_not_measured() -> None:
 def test_a_solved_motion_may_be_as_far_off_as_its_plan_may_be_from_what_was_asked(
     deviation: Deviation, *, standing: bool, solved: bool
 ) -> None:
-    assert are_within(off_plan(deviation)) is standing
+    found = off_plan(deviation)
+    assert ("mean joints off plan [deg]" in found) is (deviation.joints is not None)
+    assert are_within(found) is standing
     assert are_within(off_plan(deviation, is_dynamic=True)) is solved
 
 
@@ -107,5 +109,8 @@ def test_a_solved_motion_may_be_as_far_off_as_its_plan_may_be_from_what_was_aske
 def test_a_motion_that_moves_on_has_arrived_near_its_end_with_every_foot_landed(
     place: float, heading: float, missed: int, *, arrived: bool
 ) -> None:
-    landings = Landings(missed=missed, error=0.0)
-    assert are_within(arrival(place, heading, landings)) is arrived
+    for error in (None, 0.01):
+        end = arrival(place, heading, Landings(missed=missed, error=error))
+        assert are_within(end) is arrived
+        assert ("worst landing error [m]" in end) is (error is not None)
+        assert (told(end) == "") is arrived

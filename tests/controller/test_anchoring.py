@@ -1,7 +1,5 @@
 """Where a plan is played, and how the robot gets from where it stands to where the plan starts."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from jaxtyping import Float

@@ -1,7 +1,5 @@
 """A controller is put together whole or not at all."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import threading
@@ -71,8 +69,13 @@ def test_a_refused_configuration_closes_the_robot_that_was_made_for_it(
 ) -> None:
     closed: list[MujocoPlant] = []
     monkeypatch.setattr(MujocoPlant, "close", lambda plant: closed.append(plant))
+
+    def refuse(*_: object, **__: object) -> None:
+        raise ConfigError("no")
+
+    monkeypatch.setattr("controller.go2_controller.build_pilot", refuse)
     with pytest.raises(ConfigError):
-        GO2Controller(config=Config(backend="magic"))
+        GO2Controller()
     assert len(closed) == 1
 
 

@@ -1,7 +1,5 @@
 """A standing robot that its feet in place cannot hold steps, and stands again where it is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

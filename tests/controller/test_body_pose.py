@@ -1,7 +1,5 @@
 """The trunk's pose while the robot walks, measured in simulation."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """A motion that is called off ends on four feet, wherever in it that happens."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A posture is one at any height of the ground, still, and with every foot down where it must."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -9,11 +7,12 @@ import numpy as np
 import pytest
 
 from controller.checks import (
-    is_lying,
-    is_sitting,
-    is_standing,
+    lying,
     posture_measurements,
+    sitting,
+    standing,
 )
+from controller.modes import Limited, are_within, told
 from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
@@ -27,10 +26,10 @@ from tests.engine_helpers import state_of
 MODEL = RobotModel()
 HOME = home_poses(MODEL)
 LYING = 0.085  # m; of the base over the ground, on its belly
-CHECKS: dict[Posture, Callable[[Snapshot], bool]] = {
-    Posture.STAND: is_standing,
-    Posture.SIT: is_sitting,
-    Posture.LIE: is_lying,
+ASKED: dict[Posture, Callable[[Snapshot], Limited]] = {
+    Posture.STAND: standing,
+    Posture.SIT: sitting,
+    Posture.LIE: lying,
 }
 
 
@@ -53,7 +52,7 @@ def test_a_posture_is_known_whatever_the_height_of_the_ground(
     posture: Posture, ground: float
 ) -> None:
     snapshot = at_rest(posture, ground)
-    assert [name for name, check in CHECKS.items() if check(snapshot)] == [posture]
+    assert [name for name, asked in ASKED.items() if are_within(asked(snapshot))] == [posture]
     level = posture_measurements(at_rest(posture))
     assert posture_measurements(snapshot) == pytest.approx(level, abs=1e-9)
 
@@ -70,7 +69,7 @@ def test_on_a_slope_a_posture_has_its_height_over_the_ground_below_it(
     posture: Posture, slope: float
 ) -> None:
     # The lowest foot of a robot that sat on 8 deg was 27 mm lower: it sat still, and `sit` said no.
-    assert CHECKS[posture](at_rest(posture, slope=slope))
+    assert are_within(ASKED[posture](at_rest(posture, slope=slope)))
 
 
 @pytest.mark.parametrize(("part", "speed"), [(0, 0.06), (8, 0.6)])  # the base, a joint
@@ -81,7 +80,7 @@ def test_a_robot_that_still_moves_is_in_no_posture(
     snapshot, v = at_rest(posture), np.zeros(18)
     v[part] = speed
     moving = MODEL.snapshot(replace(snapshot.state, v=v))
-    assert not any(check(moving) for check in CHECKS.values())
+    assert not any(are_within(asked(moving)) for asked in ASKED.values())
 
 
 @pytest.mark.parametrize("posture", [Posture.STAND, Posture.SIT])
@@ -89,4 +88,4 @@ def test_a_foot_in_the_air_is_no_posture_on_four_feet(posture: Posture) -> None:
     snapshot = at_rest(posture)
     touching = np.array([True, True, False, True])
     raised = snapshot.replaced(state=replace(snapshot.state, feet_in_contact=touching))
-    assert not CHECKS[posture](raised)
+    assert told(ASKED[posture](raised)) == "feet in the air 1, limit 1"

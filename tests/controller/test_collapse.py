@@ -1,7 +1,5 @@
 """Whatever the robot does: when its trunk comes to rest on the ground or aslant, it says so."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import dataclass

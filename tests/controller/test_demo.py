@@ -1,7 +1,5 @@
 """The demo does its steps in order and judges each by what was measured."""
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess

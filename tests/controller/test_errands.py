@@ -1,7 +1,5 @@
 """What threads ask of a loop is done between its ticks, and none waits for a log handler."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Iterator
 from itertools import count

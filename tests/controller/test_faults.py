@@ -1,7 +1,5 @@
 """Every fault ends in a clear error of our own or in a limp robot, and the next call works."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -269,7 +267,7 @@ def test_a_robot_that_cannot_carry_its_weight_says_no_and_how_far_it_got(
         for _ in range(2):
             assert go2.stand() is False
             reason = go2.last_outcome.reason
-            assert reason.startswith("stand not done within 3.0 s: base height [m] 0.")
+            assert reason.startswith("stand not done within 3.0 s: height error [m] 0.")
             assert go2.mode is not Mode.STANDING
             with pytest.raises(ModeError):
                 go2.move(0.1)

@@ -1,7 +1,5 @@
 """A gamepad: what its sticks and buttons mean, with a library that is missing, empty or fake."""
 
-from __future__ import annotations
-
 import sys
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """A robot's day, and the promises of every call: honest, repeatable, and over when it is over."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -254,12 +252,22 @@ def test_a_command_beyond_the_envelope_is_clipped_and_logged(
     go2: GO2Controller, caplog: pytest.LogCaptureFixture
 ) -> None:
     assert go2.walk()
+    slightly = 1.1 * trot_of().forward
     with caplog.at_level(logging.WARNING):
         go2.move(0.2, 0.1)
         assert not caplog.records
-        go2.move(9.0)
-    assert "clipped from VelocityCommand(linear_x=9.0" in caplog.text
-    assert go2.command.linear_x == trot_of().forward
+        for speed in (slightly, 9.0, 30.0, 30.0):
+            go2.move(speed)
+            assert go2.command.linear_x == trot_of().forward
+        by_little, by_far = [record.message for record in caplog.records]
+        for speed, told in ((slightly, by_little), (9.0, by_far)):
+            assert f"clipped from VelocityCommand(linear_x={speed}" in told
+            assert "the envelope of gait 'trot' is " in told
+            units = "times what is followed: speeds are in m/s, turning rates in rad/s"
+            assert (units in told) is (speed == 9.0)
+        go2.move(0.2)
+        go2.move(90.0)
+        assert len(caplog.records) == 3
     go2.move(-9.0, 9.0, linear_y=9.0)
     assert -3.0 < go2.command.linear_x < 0.0
     go2.stop()

@@ -1,7 +1,5 @@
 """The controller drives other plants, in realtime too, and leaves every one of them limp."""
 
-from __future__ import annotations
-
 from inspect import isfunction
 from pathlib import Path
 
@@ -51,6 +49,15 @@ def test_a_users_mjcf_stands_under_the_same_controller(tmp_path: Path) -> None:
     path.write_text(spec.to_xml(), encoding="utf-8")
     with GO2Controller(plant=MujocoPlant(path, control_period=PERIOD)) as go2:
         assert go2.stand(), go2.last_outcome.reason
+        run = go2.recording()
+    assert (run.robot, run.model_file) == ("go2", str(path))
+
+
+def test_a_recording_says_which_robot_it_holds() -> None:
+    with GO2Controller(robot="a1") as a1:
+        a1.wait(0.1)
+        run = a1.recording()
+    assert (run.robot, run.model_file) == ("a1", "")
 
 
 def test_with_noisy_sensors_the_robot_stands_and_trots() -> None:

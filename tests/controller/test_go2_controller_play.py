@@ -1,7 +1,6 @@
 """``play`` does nothing twice, tells how far a plan is from what was written, and may ask first."""
 
-from __future__ import annotations
-
+from dataclasses import replace
 from importlib import import_module
 
 import pytest
@@ -17,6 +16,8 @@ from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline
 from tests.controller.plants import StillPlant
 from tests.solver import needs_solver
 
+AS_REPORTED = 0.010
+"""Difference [m] between what is reported of the trunk and what is measured."""
 STILL = 0.008
 """Distance [m] that a foot which stands may slide: less than the 10 mm that count as a slip."""
 
@@ -68,6 +69,28 @@ def test_play_tells_how_far_the_plan_is_from_what_was_written() -> None:
         assert measured["plan late [s]"] == pytest.approx(departed.lag)
         assert go2.play(Timeline().body(z=-0.02, over=0.4).home(over=0.4))
         assert not any("written" in name for name in go2.last_outcome.measured)
+
+
+PAIR, QUICK = Timeline(physics="nearest", shift_time=0.3), Timeline(physics="nearest")
+PAIR = PAIR.hold(0.3).foot("FL", z=0.05, over=0.2).also().foot("RR", z=0.05, over=0.2).hold(0.1)
+PAIR = PAIR.down("FL", over=0.2).also().down("RR", over=0.2).home(over=0.4).hold(0.3)
+QUICK = QUICK.hold(0.2).body(y=0.045, yaw=0.3, over=0.16).body(x=-0.04, roll=0.2, over=0.16)
+QUICK = QUICK.home(over=0.24).hold(0.2)
+
+
+@needs_solver
+@pytest.mark.parametrize("line", [PAIR, QUICK], ids=["diagonal pair", "quick trunk"])
+def test_the_nearest_to_a_refused_motion_is_done_and_as_far_off_as_reported(
+    line: Timeline, model: RobotModel
+) -> None:
+    checker = FeasibilityChecker(model)
+    assert not checker.check(replace(line, physics="as_written")).ok
+    checked = checker.evaluate(line)
+    (departed,) = checked.report.departures
+    run = play(checked.plan, model, seed=0)
+    assert run.said, run.reason
+    assert run.trunk_off == pytest.approx(departed.place, abs=AS_REPORTED)
+    assert run.trunk_off > AS_REPORTED
 
 
 @needs_solver

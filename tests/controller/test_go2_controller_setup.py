@@ -1,7 +1,5 @@
 """What a controller is made of may be missing, broken or unknown: the error says what and why."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -175,3 +173,13 @@ def test_a_task_of_ones_own_is_asked_in_plans_with_few_feet_too(plant: WatchedPl
 def test_placo_takes_no_tasks_of_ones_own(plant: WatchedPlant) -> None:
     with pytest.raises(ConfigError, match="the placo back end"):
         GO2Controller(plant=plant, config=Config(backend="placo"), extra_tasks=[SteadyTrunk()])
+
+
+def test_a_robot_rises_and_walks_by_placo(plant: WatchedPlant) -> None:
+    with GO2Controller(plant=plant, config=Config(backend="placo")) as go2:
+        assert go2._runner.loop.wbc.backend_name == "placo"
+        assert go2.walk()
+        go2.move(0.3)
+        go2.wait(0.5)
+        assert go2.last_outcome.ok
+        assert go2.telemetry.qp_failures == 0

@@ -1,7 +1,5 @@
 """What the robot does is measured: lying is no walking, a held-down paw is no high five."""
 
-from __future__ import annotations
-
 import threading
 import time
 from dataclasses import replace

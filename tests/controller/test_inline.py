@@ -1,7 +1,5 @@
 """What a notebook shows of objects."""
 
-from __future__ import annotations
-
 import tomllib
 from dataclasses import fields
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The job server: one job at a time, prepared, carried out and answered once, from any thread."""
 
-from __future__ import annotations
-
 import sys
 import threading
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """The loop damps a robot whose QP, plant or posture fails, and says why."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """In every mode something notices a fall, a foot without ground, a broken part, a second thread."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 

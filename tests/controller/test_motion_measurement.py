@@ -1,7 +1,5 @@
 """What is measured of a played motion is what happened in it, and nothing beside it."""
 
-from __future__ import annotations
-
 from contextlib import closing
 
 import numpy as np

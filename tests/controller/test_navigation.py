@@ -1,7 +1,5 @@
 """Goals point at their goal, slow down before it, and judge the measured pose."""
 
-from __future__ import annotations
-
 from math import cos, degrees, pi, radians, sin
 
 import numpy as np
@@ -9,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from controller.modes import are_within
 from controller.navigation import (
     DISTANCE_TOLERANCE,
     GREATEST_DISTANCE,
@@ -87,7 +86,7 @@ def test_whether_a_turn_is_done_may_be_asked_as_often_as_one_likes() -> None:
     goal = begun(TurnInPlace(2.0), pose())
     for yaw in (2.0, -2.0, 2.0):
         assert goal.is_done(pose(yaw=yaw)) is (yaw == 2.0)
-        assert goal.is_within_tolerance(pose(yaw=yaw)) is (yaw == 2.0)
+        assert are_within(goal.errors(pose(yaw=yaw))) is (yaw == 2.0)
         assert goal.measurements(pose(yaw=yaw))["turned [deg]"] == pytest.approx(degrees(yaw))
 
 
@@ -106,7 +105,7 @@ def test_an_ideal_robot_turns_by_the_angle_and_stays_in_place(
 ) -> None:
     goal = TurnInPlace(angle)
     end = walk(goal, x, y, yaw)
-    assert goal.is_within_tolerance(end)
+    assert are_within(goal.errors(end))
     assert goal.measurements(end)["turned [deg]"] == pytest.approx(
         goal.measurements(end)["asked [deg]"], abs=0.5
     )
@@ -119,7 +118,7 @@ def test_an_ideal_robot_walks_the_distance_along_its_heading(
 ) -> None:
     goal = DriveStraight(distance)
     end = walk(goal, x, y, yaw)
-    assert goal.is_within_tolerance(end)
+    assert are_within(goal.errors(end))
     goal = [x + distance * cos(yaw), y + distance * sin(yaw)]
     assert end.q[:2] == pytest.approx(goal, abs=0.01)
 
@@ -157,7 +156,7 @@ def test_a_turning_robot_that_drifts_is_led_back_to_its_place() -> None:
 def test_a_walk_is_judged_by_place_and_heading_and_a_turn_by_the_heading(
     goal: Goal, end: RobotState, *, is_good: bool
 ) -> None:
-    assert begun(goal, pose()).is_within_tolerance(end) is is_good
+    assert are_within(begun(goal, pose()).errors(end)) is is_good
 
 
 def test_a_robot_that_is_still_moving_is_not_done() -> None:

@@ -1,7 +1,5 @@
 """The wall clock, played by the tests: a pace that is kept or given up, warnings that are few."""
 
-from __future__ import annotations
-
 import logging
 
 import pytest

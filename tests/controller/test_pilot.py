@@ -1,7 +1,5 @@
 """Modes after calls that failed, and calls that may only say yes to what was measured."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -21,7 +19,7 @@ from tests.controller.plants import MID_RISE, PERIOD, StillPlant, WatchedPlant, 
 def test_a_robot_that_does_not_move_never_gets_a_yes(call: str) -> None:
     with GO2Controller(plant=StillPlant()) as go2:
         assert getattr(go2, call)() is False
-        assert go2.last_outcome.reason.startswith("stand not done within 3.0 s: base height [m]")
+        assert go2.last_outcome.reason.startswith("stand not done within 3.0 s: height error [m]")
         assert go2.mode is Mode.MOVING
         assert go2.last_outcome.measured["base speed [m/s]"] == 0.0
 
@@ -41,7 +39,7 @@ def test_a_robot_that_is_lifted_is_not_standing(go2: GO2Controller, plant: Watch
     ("goal", "name", "said", "reason"),
     [
         (TurnInPlace, "command", ZERO_COMMAND, "turn by 17.2 deg not done within 8.9 s: "),
-        (DriveStraight, "is_done", True, "walk 0.500 m missed: asked [m] 0.5, walked [m] "),
+        (DriveStraight, "is_done", True, "walk 0.500 m missed: distance from the goal [m] 0."),
     ],
 )
 def test_a_goal_that_is_not_reached_is_not_done_and_says_how_far_it_got(

@@ -1,7 +1,5 @@
 """Motions are compiled and checked beside a loop that ticks; neither spoils the other's numbers."""
 
-from __future__ import annotations
-
 import sys
 import threading
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """A leg that a fall has left beside the trunk is folded before the robot rises, or it says no."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """From the check's report, and from a run, to what the viewers show."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -15,11 +13,6 @@ from motions import CheckedMotion, FeasibilityChecker, Timeline
 
 _YAW, _PLACE = 1.1, np.array([0.7, -0.4, 0.0])
 _ROUNDING = 1e-9
-
-
-@pytest.fixture(scope="module")
-def checker() -> FeasibilityChecker:
-    return FeasibilityChecker()
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 """Time passes inside calls or in the background, and no thread can hang a call."""
 
-from __future__ import annotations
-
 import gc
 import io
 import logging

@@ -1,7 +1,5 @@
 """A robot is there at once: what it does not need yet is not imported."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

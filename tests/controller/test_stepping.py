@@ -1,7 +1,5 @@
 """Motions whose feet step, or leave the ground, in MuJoCo: done, or told that they were not."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Telemetry keeps the newest ticks, thins them evenly, and remembers the peaks of the whole run."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Driving by keys: what each key does, that long calls do not block, and a real terminal."""
 
-from __future__ import annotations
-
 import os
 import select
 import subprocess

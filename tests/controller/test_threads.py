@@ -1,7 +1,5 @@
 """Whoever calls, interrupts or fails, and whenever: a clear error, a safe robot, and no hanging."""
 
-from __future__ import annotations
-
 import math
 import signal
 import threading

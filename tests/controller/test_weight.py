@@ -1,7 +1,5 @@
 """What a robot weighs, felt by its joints, and what a dynamic plan makes of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

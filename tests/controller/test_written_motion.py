@@ -1,7 +1,5 @@
 """How far a robot was from what was written: a recording that follows a plan, and is then moved."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

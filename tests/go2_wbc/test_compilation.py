@@ -1,7 +1,5 @@
 """Compiled kernels are kept, shared, and made anew when what was kept is of no use."""
 
-from __future__ import annotations
-
 import logging
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """A TOML file overrides what it names, and everything that is wrong in it is named."""
 
-from __future__ import annotations
-
 from contextlib import closing
 from dataclasses import fields
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Contact schedules: phases cover the cycle, intervals are half-open, and times add up."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import replace

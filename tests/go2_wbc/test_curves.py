@@ -1,7 +1,5 @@
 """Curves: their derivatives, their ends, and what is refused."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """The exceptions form the tree that their module draws, and their messages say what they must."""
 
-from __future__ import annotations
-
 import inspect
 import re
 

@@ -1,7 +1,5 @@
 """Output files: refused early and clearly, and never half written."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

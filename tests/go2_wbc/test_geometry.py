@@ -1,7 +1,5 @@
 """Convex hull and signed distance to it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import assume, given

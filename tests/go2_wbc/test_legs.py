@@ -1,7 +1,5 @@
 """Leg order and index arithmetic agree with Pinocchio's model and with each other."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 

@@ -1,7 +1,5 @@
 """A recording can be cut, and tells what was done when."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from pathlib import Path
 
@@ -26,6 +24,8 @@ def recording() -> Recording:
         p_world_com=rng.normal(size=(5, 3)),
         support_margin=rng.normal(size=5),
         labels=("stand", "stand", "bow", "bow", "stand"),
+        robot="a1",
+        model_file="my_a1.xml",
     )
 
 
@@ -37,7 +37,8 @@ def test_a_part_has_these_samples_of_every_field(
     for field in fields(Recording):
         whole, kept = getattr(recording, field.name), getattr(part, field.name)
         assert type(kept) is type(whole)
-        np.testing.assert_array_equal(np.array(kept), np.array(whole)[1:4])
+        wanted = whole if isinstance(whole, str) else np.array(whole)[1:4]
+        np.testing.assert_array_equal(np.array(kept), wanted)
     assert part.duration == pytest.approx(0.2)
 
 

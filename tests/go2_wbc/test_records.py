@@ -1,7 +1,5 @@
 """Records: names for the numbers of a row, the same for Python, numpy and compiled code."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from dataclasses import dataclass, field

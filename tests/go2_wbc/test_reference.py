@@ -1,7 +1,5 @@
 """References: placing a motion in the world is a rigid motion, and anchors undo it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -12,14 +10,14 @@ from hypothesis import strategies as st
 from go2_wbc.errors import CommandError
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.reference import (
-    REACH,
+    ASTRAY,
     STILL,
     Anchor,
     LegTask,
     Reference,
     Target,
     TrackedPoint,
-    feet_astray,
+    hold_feet,
     sag_and_lean,
 )
 from go2_wbc.robot.model import RobotModel
@@ -141,15 +139,24 @@ def test_sag_is_measured_at_what_is_tracked_and_lean_between_the_verticals() -> 
         assert_plain_is_compiled(sag_and_lean, Target.of(reference.row), snapshot)
 
 
-def test_a_foot_is_astray_that_stays_where_it_shall_not_in_the_air() -> None:
+def test_a_foot_is_held_by_what_its_motors_push_it_with_towards_its_place() -> None:
+    seen = 0
     for snapshot, reference in cases(MODEL, 50, seed=12):
-        astray, state = np.empty(4), snapshot.state
-        feet_astray(Target.of(reference.row), snapshot, astray)
-        lag = np.linalg.norm(reference.p_world_feet - snapshot.p_world_feet, axis=1)
-        turned = (reference.q_joints - state.joint_positions).reshape(4, 3)
-        stays = np.linalg.norm(snapshot.v_world_feet, axis=1) < STILL
-        by = {LegTask.STANCE: 0.0 * lag, LegTask.SWING: lag}
-        by[LegTask.JOINTS] = REACH * np.linalg.norm(turned, axis=1)
-        expected = [by[task][leg] * stays[leg] for leg, task in enumerate(reference.legs)]
-        assert astray == pytest.approx(expected, abs=EXACT)
-        assert_plain_is_compiled(feet_astray, Target.of(reference.row), snapshot, astray)
+        target, held, turned = Target.of(reference.row), np.empty(4), snapshot.state
+        tau = np.random.default_rng(seen).uniform(-20.0, 20.0, 12)
+        snapshot = snapshot.replaced(v_world_feet=0.1 * snapshot.v_world_feet)
+        assert hold_feet(target, snapshot, tau, held) == held.max()
+        for leg, task in enumerate(reference.legs):
+            joints = slice(3 * leg, 3 * leg + 3)
+            J = snapshot.J_feet[leg][:, 6:][:, joints]
+            way = reference.p_world_feet[leg] - snapshot.p_world_feet[leg]
+            if task is LegTask.JOINTS:
+                way = J @ (reference.q_joints - turned.joint_positions)[joints]
+            force = np.linalg.solve(J.T, (tau - snapshot.bias[6:])[joints])
+            stays = np.linalg.norm(snapshot.v_world_feet[leg]) < STILL
+            is_held = task is not LegTask.STANCE and stays and np.linalg.norm(way) > ASTRAY
+            expected = force @ way / np.linalg.norm(way) if is_held else 0.0
+            assert held[leg] == pytest.approx(expected, rel=1e-6)
+            seen += is_held
+        assert_plain_is_compiled(hold_feet, target, snapshot, tau, held)
+    assert seen > 10

@@ -11,6 +11,7 @@ import pytest
 from go2_wbc.errors import ConfigError
 from go2_wbc.validation import (
     FINITE,
+    LARGEST,
     NOT_NEGATIVE,
     POSITIVE,
     SHARE,
@@ -49,9 +50,9 @@ class Planner:
 
 TINY = math.ulp(0.0)
 ALLOWED: list[tuple[Rule, list[object]]] = [
-    (POSITIVE, [TINY, 1, 1e300]),
+    (POSITIVE, [TINY, 1, LARGEST]),
     (NOT_NEGATIVE, [0, 0.0, TINY, 7.0]),
-    (FINITE, [-1e300, 0.0, 3, (1.0, -2.0)]),
+    (FINITE, [-LARGEST, 0.0, 3, (1.0, -2.0)]),
     (SHARE, [TINY, 0.5, 1, 1.0]),
     (between(-1.0, 2.0), [-1.0, 0, 2.0]),
 ]
@@ -69,6 +70,12 @@ NO_NUMBERS: list[object] = [math.nan, math.inf, -math.inf, True, False, "1", Non
 def test_what_is_in_range_is_accepted(rule: Rule, values: list[object]) -> None:
     for value in values:
         require(Settings(value, value), rule, "value", "other")
+
+
+@pytest.mark.parametrize("rule", [POSITIVE, NOT_NEGATIVE, FINITE])
+def test_no_number_is_larger_than_any_of_a_robot(rule: Rule) -> None:
+    with pytest.raises(ConfigError, match=r"Settings.value must be 1e\+09 at most, got 11"):
+        require(Settings(1.1 * LARGEST, 0.0), rule, "value")
 
 
 @pytest.mark.parametrize(("rule", "what", "values"), REFUSED)

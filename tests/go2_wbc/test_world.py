@@ -1,7 +1,5 @@
 """A world is checked, drawn from, and met by a simulated robot."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 
 import numpy as np

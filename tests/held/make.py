@@ -4,8 +4,6 @@ Run it with the code of a release, when there is something new to hold. What was
 never taken out: it is out there, in scripts and on disks.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import inspect

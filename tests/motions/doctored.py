@@ -1,7 +1,5 @@
 """Plans made from good ones by breaking one thing."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

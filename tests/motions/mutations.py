@@ -4,8 +4,6 @@ The oracle reads the compiled plan with Pinocchio and plane geometry. It shares 
 feasibility check, so that the two can be set against each other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TypeVar

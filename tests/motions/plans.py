@@ -1,7 +1,5 @@
 """Compiled plans for tests: of the library, each once in a run, and what their curves say."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

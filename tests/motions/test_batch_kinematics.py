@@ -1,7 +1,5 @@
 """Trunk and joints from feet and CoM, all instants at once, against Pinocchio and rotations."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """The library is found by name, and every motion in it is feasible and well formed."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The ways between postures start where the robot is and end where they say."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

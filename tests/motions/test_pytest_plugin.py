@@ -1,7 +1,5 @@
 """The pytest plugin: motions are tests, and a failure is a table and no traceback."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Motions of a user's own file: found by name, and every mistake named with its file and line."""
 
-from __future__ import annotations
-
 import os
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Seeded faults: of the library's motions with one thing broken, the check must catch them all."""
 
-from __future__ import annotations
-
 import pytest
 
 from go2_wbc.robot.model import RobotModel

@@ -1,7 +1,5 @@
 """``python -m tests.mutation``: draws mutants, tests each, and keeps a list that can be resumed."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

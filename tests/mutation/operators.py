@@ -6,8 +6,6 @@ the usual ones of today's tools: constants, calls of opposite meaning, ``return`
 What only talks is left alone: annotations, decorators, f-strings, raised errors and log lines.
 """
 
-from __future__ import annotations
-
 import ast
 import copy
 from collections import Counter

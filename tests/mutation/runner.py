@@ -1,7 +1,5 @@
 """Runs tests on a private copy of the tree, in which one file at a time is changed."""
 
-from __future__ import annotations
-
 import contextlib
 import gc
 import importlib

@@ -1,7 +1,5 @@
 """The mutation run finds what is planted: a change that a test notices, and one that none does."""
 
-from __future__ import annotations
-
 import ast
 import json
 from pathlib import Path

@@ -3,8 +3,6 @@
 ``python -m tests.scenarios.random_drops --count 100 --first 1000`` runs a hundred of them.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass

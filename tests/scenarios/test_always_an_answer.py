@@ -3,8 +3,6 @@
 A sample of ``python -m benchmarks qp_infeasibility``, one seed of each row.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

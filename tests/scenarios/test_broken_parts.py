@@ -1,7 +1,5 @@
 """A part breaks: it is named within half a second, and the robot goes on, or goes limp in time."""
 
-from __future__ import annotations
-
 import pytest
 
 from controller import GO2Controller

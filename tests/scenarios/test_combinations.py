@@ -1,7 +1,5 @@
 """Commands that act late, on ground that is slippery, with a load: each alone holds, and all do."""
 
-from __future__ import annotations
-
 import pytest
 
 from controller.sweeps.trials import TrialRobot

@@ -1,7 +1,5 @@
 """Every gait that has a name walks at the edge of its envelope, rests, and does what comes next."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np
@@ -40,7 +38,7 @@ def test_a_gait_walks_at_the_edge_of_its_envelope_and_comes_to_rest(name: str) -
         go2.move(FAST)
         wanted = go2.command.linear_x
         assert wanted == pytest.approx(envelope_of(GAITS[name], VelocityEnvelope()).forward)
-        go2.wait(3.0)  # a bound takes as long to find out that the ground holds
+        go2.wait(2.0)
         truth.clear()
         go2.wait(2.0)
         speed = float(truth.recording().com_velocity[:, 0].mean())
@@ -53,6 +51,14 @@ def test_a_gait_walks_at_the_edge_of_its_envelope_and_comes_to_rest(name: str) -
         assert truth.fall() is None
         assert np.abs(go2.state.v[:6]).max() < 0.1
     truth.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turn", [-1.4, 0.5, 1.8])
+def test_a_bound_turns_at_once_on_ground_of_which_nothing_is_known(turn: float) -> None:
+    with GO2Controller(plant=MujocoPlant(friction=FRICTION, seed=9700)) as go2:
+        assert go2.walk("bound")
+        assert go2.turn_left(turn)
 
 
 @pytest.mark.slow

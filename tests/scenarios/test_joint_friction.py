@@ -1,7 +1,5 @@
 """The robot does what it is asked on joints whose friction the controller knows only roughly."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@ It fell at 2.5 and 3 m/s: noise on the feet's forces read as feet that stumble, 
 still, and the feet's creeping in step with the bouncing trunk as a pitch of 2 deg.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

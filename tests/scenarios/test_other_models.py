@@ -3,8 +3,6 @@
 A1 and Go1 do by their profiles what a Go2 does.
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

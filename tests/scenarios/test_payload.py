@@ -1,7 +1,5 @@
 """A robot that carries something beside its middle stands and walks level, and knows what it is."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

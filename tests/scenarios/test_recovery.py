@@ -1,7 +1,5 @@
 """After a fall onto the belly, a side or the back, the robot gets up."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A robot that has walked comes to rest, stays there, and does what it is asked next."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

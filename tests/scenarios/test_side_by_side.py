@@ -1,7 +1,5 @@
 """Several robots in one process do not know of each other."""
 
-from __future__ import annotations
-
 import pytest
 
 from controller import GO2Controller, Mode

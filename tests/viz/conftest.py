@@ -1,7 +1,5 @@
 """Shared recordings."""
 
-from __future__ import annotations
-
 import pytest
 
 from go2_wbc.recording import Recording

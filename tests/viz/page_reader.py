@@ -1,7 +1,5 @@
 """Reads an exported page back: the packed data, the scene, and its own forward kinematics."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import json

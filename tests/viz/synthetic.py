@@ -1,7 +1,5 @@
 """A made-up recording with every feature that the viewers draw: kinematics only, no physics."""
 
-from __future__ import annotations
-
 import numpy as np
 from jaxtyping import Float
 

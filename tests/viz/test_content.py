@@ -1,7 +1,5 @@
 """Recordings that cannot be drawn are refused with the reason."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

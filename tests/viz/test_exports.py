@@ -1,7 +1,5 @@
 """``import viz`` is cheap, drawing knows no pages, exports refuse a path before the work."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """A made-up verdict with everything that the viewers draw."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from viz.content import Annotation, MarginCurve, Verdict

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.recording import Recording
@@ -29,6 +30,7 @@ _HEADROOM = 0.9  # share of the limit that the forecast may reach
 _RENDER_SHARE = 0.75  # share of the progress bar for the pictures; the rest is the encoding
 
 
+@typed(late=True)
 def export_animation(
     shown: Recording | ReplayContent,
     path: Path,

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output
 from viz.style import ACCENT, INK, MUTED, PLOT_SUFFIXES, STYLE, TRACK, save_figure
@@ -24,6 +25,7 @@ _HEAD, _FOOT = 0.8, 0.3  # [inch] above and below the panels
 _BINS = 30
 
 
+@typed()
 def export_distributions(
     numbers: Mapping[str, Sequence[float]],
     rates: Mapping[str, RateWithInterval],

@@ -12,13 +12,12 @@ from PIL import Image, ImageDraw, ImageFont
 
 from go2_wbc.legs import LEGS
 from go2_wbc.recording import Recording
-from go2_wbc.robot.profile import find_profile
 from viz.content import Annotation
 from viz.render.camera import Camera
 from viz.render.framing import camera_path, heading_path, nearest_rows
 from viz.render.mesh import Surface, arrow
 from viz.render.renderer import render
-from viz.render.robot_meshes import PosedRobot, load_robot_visuals
+from viz.render.robot_meshes import PosedRobot, visuals_of
 from viz.style import ACCENT, ALARM, FORCE, INK, LEG_COLORS, MUTED, TRACK, rgb
 
 _INSTANT = 0.04  # [s] a limit that is broken for an instant is told for this long around it
@@ -72,7 +71,11 @@ class FrameRenderer:
         self._recording = recording
         self._broken = [annotation for annotation in annotations if annotation.is_broken]
         self._style = style
-        self._robot = PosedRobot(load_robot_visuals().simplified(style.detail))
+        visuals = visuals_of(recording)
+        self._robot, self._foot_radius = (
+            PosedRobot(visuals.simplified(style.detail)),
+            visuals.foot_radius,
+        )
         self._path = camera_path(recording, self._robot, smoothing=style.smoothing)
         self._heading = heading_path(recording, smoothing=style.turn_smoothing)
 
@@ -160,7 +163,7 @@ class FrameRenderer:
 
     def _arrows(self, k: int) -> list[Surface]:
         recording = self._recording
-        feet = self._robot.feet(recording.q[k]) - [0.0, 0.0, find_profile().foot_radius]
+        feet = self._robot.feet(recording.q[k]) - [0.0, 0.0, self._foot_radius]
         return [
             arrow(foot, float(force) * _METRES_PER_NEWTON, 0.006, rgb(FORCE))
             for foot, force in zip(feet, recording.foot_forces[k], strict=True)

@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output
 from viz.content import MarginCurve, Verdict
@@ -35,13 +36,13 @@ _ZERO_SHARE = 0.22  # least share of a curve's height below the limit, so that i
 _ABOVE, _BELOW = "#f6f8fc", "#fdeeee"
 
 
+@typed()
 def export_plot(verdict: Verdict, path: Path, *, title: str) -> Path:
     """Write the margins of every limit over time, the broken ones first; gives the absolute path.
 
     Args:
         verdict: what a check says.
         path: file to write, ``.svg``, ``.png`` or ``.pdf``.
-        title: name of the motion.
 
     Raises:
         ConfigError: for a path that cannot be written, or a verdict without a curve.
@@ -50,6 +51,7 @@ def export_plot(verdict: Verdict, path: Path, *, title: str) -> Path:
     return save_figure(margin_figure(verdict, title=title), target)
 
 
+@typed()
 def margin_figure(verdict: Verdict, *, title: str) -> Figure:
     """The same as a matplotlib figure, to be changed or shown in a notebook.
 

@@ -1,22 +1,36 @@
-"""The Go2's visual meshes, each loaded once and shared by the legs, and the robot in a pose."""
+"""A robot's visual meshes, each loaded once and shared by the legs, and the robot in a pose."""
 
 from __future__ import annotations
 
 import functools
+import logging
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import final
 
+import coal
 import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
 from go2_wbc.legs import FOOT_NAMES
-from go2_wbc.robot.description import find_description, read_mesh
+from go2_wbc.recording import Recording
+from go2_wbc.robot.description import (
+    MeshPart,
+    RobotDescription,
+    find_description,
+    is_urdf,
+    read_mesh,
+    solid,
+)
+from go2_wbc.robot.profile import GO2
 from viz.render.mesh import Surface, simplify, smooth_surface
 
 _CREASE = np.deg2rad(22.0)  # the files have lost their smoothing; 22 deg looks like it
 _COARSE_CREASE = np.deg2rad(32.0)  # a coarse surface has larger angles between its faces
+_MOST_TRIANGLES, _FINE = 100_000, 0.003  # a robot of more loses details smaller than this [m]
+_logger = logging.getLogger(__name__)
 _BLACK_LIFT = 34 / 255  # least value of a colour: pure black would show no shape
 
 
@@ -28,43 +42,118 @@ class RobotVisuals:
         meshes: the surfaces of each mesh file in its own frame, one for each colour, by its path.
         geometry: which mesh sits where, in the URDF's order.
         model: Pinocchio's kinematic model (free flyer).
+        description: of the robot.
     """
 
     meshes: dict[str, tuple[Surface, ...]]
     geometry: pin.GeometryModel
     model: pin.Model
+    description: RobotDescription
+
+    @property
+    def foot_radius(self) -> float:
+        """Radius [m] of the feet."""
+        return self.description.profile.foot_radius
 
     def simplified(self, cell: float) -> RobotVisuals:
-        """A coarser copy: details below ``cell`` [m] are merged."""
-        meshes = {
-            path: tuple(simplify(part, cell=cell, crease=_COARSE_CREASE) for part in parts)
-            for path, parts in self.meshes.items()
-        }
+        """A coarser copy: details below ``cell`` [m] are merged; what is all detail stays."""
+
+        def coarse(part: Surface) -> Surface:
+            found = simplify(part, cell=cell, crease=_COARSE_CREASE)
+            return found if len(found.triangles) else part
+
+        meshes = {path: tuple(map(coarse, parts)) for path, parts in self.meshes.items()}
         return replace(self, meshes=meshes)
 
 
-@functools.cache
-def load_robot_visuals() -> RobotVisuals:
-    """Load the Go2's visual meshes at full detail; the second call costs nothing.
+def visuals_of(recording: Recording) -> RobotVisuals:
+    """What is drawn of the robot of a recording: its own file, if that is still there.
 
     Raises:
-        DescriptionError: if the robot's files are missing or hold no triangles.
+        ConfigError: for a robot that does not ship.
+        DescriptionError: as ``load_robot_visuals``.
     """
-    description = find_description()
+    file = recording.model_file
+    if file and not Path(file).is_file():
+        _logger.warning("%s is gone: the robot is drawn as any %s", file, recording.robot)
+        file = ""
+    return load_robot_visuals(recording.robot, file)
+
+
+@functools.cache
+def load_robot_visuals(robot: str = GO2, model_file: str = "") -> RobotVisuals:
+    """Load a robot's visual meshes at full detail; the second call costs nothing.
+
+    Args:
+        robot: name of its profile.
+        model_file: a user's MJCF or URDF of it.
+
+    Raises:
+        ConfigError: for a robot that does not ship.
+        DescriptionError: if files are missing or hold no triangles.
+    """
+    is_mjcf = bool(model_file) and not is_urdf(model_file)
+    description = find_description(None if is_mjcf else model_file or None, robot)
     urdf, folders = str(description.urdf_path), [str(folder) for folder in description.package_dirs]
     model = pin.buildModelFromUrdf(urdf, pin.JointModelFreeFlyer())
     kind, geometry = pin.GeometryType.VISUAL, pin.GeometryModel()
+    if is_mjcf:
+        return _as_in_mjcf(model_file, RobotVisuals({}, geometry, model, description))
     pin.buildGeomFromUrdf(model, urdf, kind, geometry, folders)
-    paths = dict.fromkeys(item.meshPath for item in geometry.geometryObjects)
-    return RobotVisuals({path: _surfaces(path) for path in paths}, geometry, model)
+    meshes: dict[str, tuple[Surface, ...]] = {}
+    for item in geometry.geometryObjects:
+        part = _solid(item)
+        if part is not None:
+            item.meshPath = item.name
+            meshes[item.name] = _surfaces([part])
+        elif item.meshPath not in meshes:
+            meshes[item.meshPath] = _surfaces(read_mesh(Path(item.meshPath)))
+    return _slender(RobotVisuals(meshes, geometry, model, description))
 
 
-def _surfaces(path: str) -> tuple[Surface, ...]:
+def _slender(visuals: RobotVisuals) -> RobotVisuals:
+    """The same, with fewer details if a page could not hold them."""
+    parts = (part for parts in visuals.meshes.values() for part in parts)
+    is_fine = sum(len(part.triangles) for part in parts) > _MOST_TRIANGLES
+    return visuals.simplified(_FINE) if is_fine else visuals
+
+
+def _solid(item: pin.GeometryObject) -> MeshPart | None:
+    """A shape that a URDF describes without a mesh."""
+    shape, kind = item.geometry, type(item.geometry).__name__.lower()
+    round_size = [getattr(shape, name, 0.0) for name in ("radius", "halfLength")]
+    size = shape.halfSide if kind == "box" else np.array([*round_size, 0.0])
+    return solid(kind, size, tuple(item.meshColor.tolist()))
+
+
+def _as_in_mjcf(path: str, empty: RobotVisuals) -> RobotVisuals:
+    """The looks of a user's MJCF on the joints of the robot that it is.
+
+    Where its bodies have their frames is its author's choice: shapes are placed as they lie when
+    all joints are at 0, which means the same in both.
+    """
+    from go2_wbc.plant.mujoco.visuals import drawn_shapes
+
+    meshes, shapes = drawn_shapes(path)
+    data = empty.model.createData()
+    pin.forwardKinematics(empty.model, data, pin.neutral(empty.model))
+    for k, shape in enumerate(shapes):
+        joint = empty.model.getJointId(shape.joint) if shape.joint else 1
+        place = data.oMi[joint].inverse() * pin.SE3(shape.T_base_shape)
+        link = shape.link if empty.model.existFrame(shape.link) else empty.model.names[joint]
+        frame = empty.model.getFrameId(link)
+        item = pin.GeometryObject(f"shape{k}", joint, frame, place, coal.Sphere(0.0), shape.mesh)
+        empty.geometry.addGeometryObject(item)
+    looks = {name: _surfaces([part]) for name, part in meshes.items()}
+    return _slender(replace(empty, meshes=looks))
+
+
+def _surfaces(parts: Sequence[MeshPart]) -> tuple[Surface, ...]:
     return tuple(
         smooth_surface(
             part.points, part.triangles, np.maximum(part.rgba[:3], _BLACK_LIFT), crease=_CREASE
         )
-        for part in read_mesh(Path(path))
+        for part in parts
     )
 
 

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.recording import Recording, Span
-from go2_wbc.robot.profile import find_profile
 from viz.content import check_recording
 from viz.render.frame_renderer import FrameRenderer, ShotStyle
 from viz.render.framing import nearest_rows
-from viz.render.robot_meshes import PosedRobot, load_robot_visuals
+from viz.render.robot_meshes import PosedRobot, visuals_of
 
 FILMSTRIP_SUFFIXES = (".png",)
 _MOST_PANELS = 6
@@ -31,6 +31,7 @@ _SETTLED = 0.7  # share of a span after which a slow behaviour has taken its sha
 _CANDIDATES = 60  # poses of a span that are looked at
 
 
+@typed()
 def export_filmstrip(
     recording: Recording, path: Path, *, times: Sequence[float | int] | None = None
 ) -> Path:
@@ -69,7 +70,7 @@ def export_filmstrip(
 def telling_times(recording: Recording) -> list[float]:
     """One moment for each behaviour, in order: where a foot is highest, or the pose settled."""
     spans = _interesting_spans(recording.spans())
-    robot = PosedRobot(load_robot_visuals())
+    robot = PosedRobot(visuals_of(recording))
     return [_telling_time(recording, robot, span) for span in spans]
 
 
@@ -84,9 +85,8 @@ def _interesting_spans(spans: Sequence[Span]) -> list[Span]:
 def _telling_time(recording: Recording, robot: PosedRobot, span: Span) -> float:
     times = np.linspace(span.start, span.end, _CANDIDATES + 2)[1:-1]
     rows = nearest_rows(recording, times)
-    heights = [
-        robot.feet(recording.q[row])[:, 2].max() - find_profile().foot_radius for row in rows
-    ]
+    radius = visuals_of(recording).foot_radius
+    heights = [robot.feet(recording.q[row])[:, 2].max() - radius for row in rows]
     best = int(np.argmax(heights))
     if heights[best] > _LIFTED:
         return float(times[best])

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import meshcat
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.recording import Recording
@@ -22,6 +23,7 @@ _SCRIPTS = "data stage scene ghost steps flags charts trust verdict sound app"
 """Of the assets, in the order in which they need one another; a live page has another one."""
 
 
+@typed()
 def export_html(shown: Recording | ReplayContent, path: Path, *, title: str) -> Path:
     """Write an interactive 3D replay as one self-contained page; gives its absolute path.
 
@@ -41,7 +43,8 @@ def export_html(shown: Recording | ReplayContent, path: Path, *, title: str) -> 
 
 def replay_html(shown: Recording | ReplayContent, *, title: str) -> str:
     """The page of ``export_html`` as text; raises as it does, but for the path."""
-    page = page_text(title, scene_text(), content_text(checked_content(shown), title))
+    content = checked_content(shown)
+    page = page_text(title, scene_text(content.recording), content_text(content, title))
     if (size := len(page.encode())) > PAGE_LIMIT:
         raise ConfigError(
             f"the page would have {size} bytes, limit {PAGE_LIMIT}; record a shorter run"

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import re
 import uuid
+from collections import Counter
 from types import SimpleNamespace
 from typing import final
 
@@ -65,10 +66,12 @@ def robot_scene(visuals: RobotVisuals, pack: Pack) -> dict[str, object]:
         # The lower half of a revolute joint's motion subspace is its axis, in its own frame.
         axis = np.ravel(model.joints[joint].createData().S)[3:].tolist()
         joints.append({"path": paths[joint], "axis": axis})
+    used: Counter[str] = Counter()
     for item in visuals.geometry.geometryObjects:
-        link = model.frames[item.parentFrame].name
+        link = "base" if item.parentJoint == 1 else model.frames[item.parentFrame].name
         for row, part in enumerate(visuals.meshes[item.meshPath]):
-            node = scene[f"{paths[item.parentJoint]}/{link}_{row}"]
+            node = scene[f"{paths[item.parentJoint]}/{link}_{used[link]}"]
+            used[link] += 1
             node.set_object(SharedMesh(table[item.meshPath, row]), _material(part))
             node.set_transform(item.placement.homogeneous)
     _add_markers(scene)

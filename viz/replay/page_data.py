@@ -10,11 +10,9 @@ from jaxtyping import Float
 
 from go2_wbc.legs import LEGS
 from go2_wbc.recording import Recording
-from go2_wbc.robot.description import find_description
-from go2_wbc.robot.profile import find_profile
 from viz.content import MarginCurve, ReplayContent, Verdict
 from viz.render.framing import smoothed
-from viz.render.robot_meshes import PosedRobot, load_robot_visuals
+from viz.render.robot_meshes import PosedRobot, visuals_of
 from viz.replay.meshcat_scene import robot_scene
 from viz.replay.packing import Pack
 from viz.style import LEG_COLORS
@@ -29,12 +27,12 @@ _PLAIN = {"stance": np.uint8, "margin": np.float32, "torque": np.float32}
 """How frames are stored that are not 16-bit numbers between their extremes."""
 
 
-def scene_text() -> str:
-    """The robot and the markers, packed: the same for every page."""
-    pack = Pack()
-    scene = robot_scene(load_robot_visuals(), pack)
+def scene_text(recording: Recording) -> str:
+    """The robot of the recording and the markers, packed: the same for every page of it."""
+    pack, visuals = Pack(), visuals_of(recording)
+    scene = robot_scene(visuals, pack)
     legs = {"legs": [leg.name for leg in LEGS], "leg_colors": LEG_COLORS}
-    return pack.packed({**scene, **legs, "foot_radius": find_profile().foot_radius})
+    return pack.packed({**scene, **legs, "foot_radius": visuals.foot_radius})
 
 
 def content_text(content: ReplayContent, title: str, version: str = "") -> str:
@@ -50,6 +48,7 @@ def content_text(content: ReplayContent, title: str, version: str = "") -> str:
         "labels": [[s.start, s.end, s.label] for s in content.recording.spans()],
         "force_scale": max(highest, _LEAST_FORCE_SCALE),
         "beats": list(content.beats),
+        "bar": content.bar,
         "end_pose": content.end_pose,
         "has_sound": bool(content.sound),
         "sliders": [asdict(slider) for slider in content.sliders],
@@ -83,8 +82,9 @@ def replay_frames(recording: Recording) -> tuple[float, dict[str, np.ndarray]]:
     last = len(recording.time) - 1
     rows = np.minimum(np.searchsorted(recording.time, wanted - 0.25 / rate), last)
     rows[-1] = last
-    robot, q = PosedRobot(load_robot_visuals()), _continuous(recording.q[rows])
-    ratio = np.max(np.abs(recording.tau) / find_description().efforts, axis=1)
+    visuals, q = visuals_of(recording), _continuous(recording.q[rows])
+    robot = PosedRobot(visuals)
+    ratio = np.max(np.abs(recording.tau) / visuals.description.efforts, axis=1)
     return rate, {
         "q": q,
         "feet": np.array([robot.feet(row).ravel() for row in q]),

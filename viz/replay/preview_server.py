@@ -12,6 +12,7 @@ import logging
 import threading
 import uuid
 from collections.abc import Callable, Mapping
+from datetime import datetime
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import final
@@ -77,7 +78,7 @@ class PreviewServer(ThreadingHTTPServer):
                 drawn.
         """
         self._title, self.on_values = title, on_values
-        self._scene = scene_text()
+        self._scene = scene_text(content.recording)
         self._changed = threading.Condition()
         self._is_open = True
         self._pack(content)
@@ -105,8 +106,9 @@ class PreviewServer(ThreadingHTTPServer):
             self._changed.notify_all()
 
     def publish_error(self, message: str) -> None:
-        """Say what is wrong, and keep what was shown."""
+        """Say what is wrong, since when, and what is shown: the last version that compiled."""
         with self._changed:
+            self._broken_since = self._broken_since or f"{datetime.now():%H:%M:%S}"
             self._error = message
             self._changed.notify_all()
 
@@ -131,7 +133,7 @@ class PreviewServer(ThreadingHTTPServer):
         """Wait for another state than ``seen``; "" if there is none for long.
 
         Returns:
-            Version and error as JSON; ``None`` once the server ends.
+            Version, error and its title as JSON; ``None`` once the server ends.
         """
         with self._changed:
             self._changed.wait_for(lambda: not self._is_open or self._told() != seen, _HEARTBEAT)
@@ -141,7 +143,12 @@ class PreviewServer(ThreadingHTTPServer):
         return "" if state == seen else state
 
     def _told(self) -> str:
-        return json.dumps({"version": self._version, "error": self._error})
+        shown = "the last version that compiled"
+        if not self._is_feasible:
+            shown += ", which the robot cannot do"
+        title = f"Broken since {self._broken_since}. What is shown is {shown}."
+        error = {"error": self._error, "title": title if self._error else ""}
+        return json.dumps({"version": self._version, **error})
 
     def handle_error(self, request: object, client_address: object) -> None:
         """Log what went wrong in an answer; the page may have been closed meanwhile."""
@@ -150,7 +157,8 @@ class PreviewServer(ThreadingHTTPServer):
     def _pack(self, content: ReplayContent) -> None:
         version = uuid.uuid4().hex
         self.data = content_text(checked_content(content), self._title, version)
-        self._version, self._error = version, None
+        self._version, self._error, self._broken_since = version, None, ""
+        self._is_feasible = content.verdict is None or content.verdict.ok
 
 
 @final

@@ -11,7 +11,7 @@ from controller import arguments
 from controller.bridges import ros2
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.states import state_of
-from controller.modes import listed
+from controller.modes import listed, told
 from controller.navigation import DriveStraight, Goal, TurnInPlace
 from go2_wbc.errors import BridgeError, MissingDependency
 from go2_wbc.planning.command import VelocityCommand, finite_number
@@ -148,7 +148,7 @@ class GO2ControllerNode(ros.Node):
 
     def turn_left(self, angle: float) -> bool:
         """Turn left in place by ``angle`` [rad], closed on odometry; negative turns right."""
-        return self._run_goal(TurnInPlace(finite_number("angle", angle)))
+        return self._run_goal(TurnInPlace(angle))
 
     def turn_right(self, angle: float) -> bool:
         """Turn right in place by ``angle`` [rad], closed on odometry."""
@@ -156,7 +156,7 @@ class GO2ControllerNode(ros.Node):
 
     def move_forward(self, distance: float) -> bool:
         """Walk ``distance`` [m] straight ahead, closed on odometry; negative is backward."""
-        return self._run_goal(DriveStraight(finite_number("distance", distance)))
+        return self._run_goal(DriveStraight(distance))
 
     def _run_goal(self, goal: Goal) -> bool:
         if not self.walk():
@@ -173,8 +173,8 @@ class GO2ControllerNode(ros.Node):
                 self.stop()
                 return self._conclude(goal.name, False, "odometry has ceased")
         state = self._come_to_rest(state)
-        figures = listed(goal.measurements(state))
-        return self._conclude(goal.name, goal.is_within_tolerance(state), figures)
+        missed, figures = told(goal.errors(state)), listed(goal.measurements(state))
+        return self._conclude(goal.name, not missed, "; ".join(filter(None, (missed, figures))))
 
     def _come_to_rest(self, state: RobotState) -> RobotState:
         end, moved_at = state.time + REST_LIMIT, state.time

@@ -78,7 +78,6 @@ def serve(
     """Serve a simulated Go2 until ``stop`` is set.
 
     Args:
-        settings: how.
         stop: ends it: whoever waits for an answer gets one, and the robot goes limp.
         on_ready: is told, once, what is offered and what is not.
 

@@ -57,10 +57,9 @@ class VelocityInput:
             self._throttle.warn("mode", f"cmd_vel ignored: the robot is {state}, send 'walk' first")
             return
         wanted = VelocityCommand(x, y, turn)
-        command = self._envelope.clip(wanted)
-        if command != wanted:
-            self._throttle.warn("clip", f"cmd_vel clipped from {wanted} to {command}")
-        self._move(command)
+        if excess := self._envelope.excess(wanted):
+            self._throttle.warn("clip", f"cmd_vel: {excess}")
+        self._move(self._envelope.clip(wanted))
         self.counts["followed"] += 1
         self._last = self._go2.state.time
 

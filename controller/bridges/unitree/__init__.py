@@ -6,9 +6,13 @@ Only ``bus.py`` imports the DDS library, and it is imported by what needs it.
 from __future__ import annotations
 
 import importlib
+import sys
 
 from go2_wbc.errors import MissingDependency
 from go2_wbc.extras import install_line
+
+LOOPBACK = "lo0" if sys.platform == "darwin" else "lo"
+"""Where simulators live, which need not have a motion switcher; a robot has one."""
 
 
 def require_dds() -> None:

@@ -129,7 +129,7 @@ class Bus:
         return Reader(self._participant, reader, depth)
 
     def _topic(self, name: str) -> Topic[Any]:
-        return Topic(self._participant, name, type_of(name))
+        return Topic(self._participant, name, _struct(_STRUCT_OF_TOPIC[name.rpartition("/")[2]]))
 
 
 def _open_domain(domain: int, interface: str) -> None:
@@ -181,11 +181,6 @@ _STRUCT_OF_TOPIC: Final = {
     "response": "Response_",
 }
 """By the last part of the topic's name; every service has its requests and responses."""
-
-
-def type_of(topic: str) -> type:
-    """The DDS type of a topic's samples."""
-    return _struct(_STRUCT_OF_TOPIC[topic.rpartition("/")[2]])
 
 
 @cache

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final, final
 import numpy as np
 
 from controller.behaviours.joints import DAMPING
-from controller.bridges.unitree import require_dds
+from controller.bridges.unitree import LOOPBACK, require_dds
 from controller.bridges.unitree.guards import GuardConfig, Guards, is_passive, require_sane
 from controller.bridges.unitree.low_level import (
     as_it_says,
@@ -60,8 +60,6 @@ SWITCHER_LIMIT: Final = 1.0
 """Time [s] in which the robot's motion switcher must be found."""
 RELEASE_LIMIT, RELEASE_PERIOD = 5.0, 0.2
 """Time [s] in which its motion service must let go, and between two requests to."""
-LOOPBACK: Final = "lo"
-"""Where simulators live, which need not have a motion switcher; a robot has one."""
 CONSENT: Final = (
     "this moves a robot: lay it on its belly, keep people away, take the remote in your hand (L2+B "
     "damps it), then say so by --i-have-the-remote-in-hand (in Python "

@@ -13,7 +13,7 @@ from typing import Final, final
 import numpy as np
 from jaxtyping import Shaped
 
-from controller.bridges.unitree import messages
+from controller.bridges.unitree import LOOPBACK, messages
 from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.low_level import CommandGate, fill_imu, low_state_message
 from controller.bridges.unitree.messages import Reply, Request, encode_message
@@ -68,7 +68,7 @@ class SimulatorSettings:
     """
 
     domain: int = 1
-    interface: str = "lo"
+    interface: str = LOOPBACK
     mjcf: Path | None = None
     friction: float | None = None
     payload: float = 0.0

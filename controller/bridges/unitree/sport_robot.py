@@ -14,7 +14,7 @@ from jaxtyping import Float
 from controller.assembly import build_pilot
 from controller.behaviours.plans import ChangePosture
 from controller.bridges.unitree.sport_api import Api
-from controller.modes import Mode
+from controller.modes import Limited, Mode
 from controller.navigation import APPROACH
 from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS
@@ -153,11 +153,11 @@ class SportRobot:
         behaviour = ChangePosture(lambda pose: lean(pose, target, LEAN_TIME))
         self._runner.run(behaviour, LEAN_LIMIT)
 
-        def is_there(snapshot: Snapshot) -> bool:
+        def asked(snapshot: Snapshot) -> Limited:
             missing = np.abs(snapshot.state.rpy[:2] - target[:2])
-            return bool(missing.max() < ATTITUDE_TOLERANCE)
+            return {"attitude error [rad]": (float(missing.max()), ATTITUDE_TOLERANCE)}
 
-        self._runner.settle("lean", is_there)
+        self._runner.settle("lean", asked)
 
     def can_hold(self, pose: BodyPose) -> bool:
         """Whether it can hold ``pose`` while it walks."""
@@ -178,6 +178,11 @@ class SportRobot:
             first = "; ".join(map(str, report.failures[:FINDINGS_TOLD]))
             _log.warning("attitude %s refused, %d findings: %s", rpy, len(report.failures), first)
         return report.ok
+
+    def excess(self, command: VelocityCommand) -> tuple[int, str]:
+        """Whether ``command`` is far (2) beyond the walking envelope or not (0), and in words."""
+        envelope = self._config.cautious_envelope
+        return 2 * envelope.is_far(command), envelope.excess(command)
 
     def steer(self, command: VelocityCommand, share: float) -> None:
         """Follow ``command``, within ``share`` of the walking envelope, in the pose that was asked.

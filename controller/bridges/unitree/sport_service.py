@@ -29,6 +29,7 @@ from controller.bridges.unitree.sport_robot import (
 )
 from controller.jobs import Answer, Job, JobServer
 from controller.modes import Aborted, Measurements, Mode
+from controller.pacing import LogOnce
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.trunk import BodyPose
@@ -82,7 +83,7 @@ class SportService:
         self._lock = threading.Lock()
         self._wanted, self._wanted_until = ZERO_COMMAND, 0.0
         self._path: SportPath | None = None
-        self._level = 0
+        self._level, self._clipped = 0, LogOnce(_log)
         self._recovers = self._has_tried_to_recover = False
         self._jobs.start("sport")
 
@@ -216,6 +217,7 @@ class SportService:
 
     def _move(self, velocity: tuple[float, float, float]) -> None:
         self._path = None
+        self._clipped.warn(*self._robot.excess(VelocityCommand(*velocity)))
         self._wanted = VelocityCommand(
             *np.clip(velocity, sport_api.MOVE_LEAST, sport_api.MOVE_GREATEST)
         )

@@ -12,10 +12,10 @@ from typing import NamedTuple, final
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from go2_wbc.legs import JOINT_NAMES
 from go2_wbc.plant.base import Plant
 from go2_wbc.plant.mujoco.contacts import Contacts, foot_contacts, touches_itself
 from go2_wbc.plant.mujoco.plant import MujocoPlant
-from go2_wbc.robot.description import BASE_LINK
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand, PartFault, RobotState
 
@@ -131,7 +131,8 @@ class GroundTruth(Plant):
         """Record what a controller does to ``plant``."""
         self._plant = plant
         self.robot, self.joint_damping = plant.robot, plant.joint_damping
-        self._base = plant.model.body(BASE_LINK).id
+        joint = plant.model.joint(JOINT_NAMES[0])  # a file of a user may name the base otherwise
+        self._base = plant.model.body_rootid[plant.model.jnt_bodyid[joint.id]]
         self.on_tick: Callable[[], None] | None = None
         self.cpu_time = 0.0
         self.clear()

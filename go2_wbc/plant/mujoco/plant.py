@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, unknown_name
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant
@@ -21,7 +22,7 @@ from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN, bin_forces, read_joints
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
 from go2_wbc.plant.mujoco.pushes import Pushes
-from go2_wbc.plant.mujoco.settling import LYING_DAMPING, settle
+from go2_wbc.plant.mujoco.settling import settle
 from go2_wbc.plant.mujoco.setup import PlantSetup, SavedPhysics, prepare
 from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors, SensorNoise
 from go2_wbc.plant.terrain import Terrain
@@ -48,6 +49,8 @@ class MujocoPlant(Plant):
 
     Args:
         mjcf: a user's own MJCF or scene of it; ``None`` builds the model from the URDF.
+        keyframe: name of the one of ``mjcf`` that it starts in instead of lying: its joints are
+            held there until it rests. ``GO2Controller.take_over`` goes on from a stance.
         timestep: physics step [s]; overrides the one of ``mjcf``.
         control_period: seconds per ``write``, an integer multiple of ``timestep``.
         friction: sliding friction coefficient; ``None`` is 0.8, or what ``mjcf`` says. With
@@ -72,11 +75,13 @@ class MujocoPlant(Plant):
         delay: time [s] after which a command acts, rounded to whole control periods.
 
     Raises:
+        ClosedError: from all calls, once it is closed.
         ConfigError: for a value that is out of range.
         ModelMismatch: if ``mjcf`` cannot be read or lacks something; names all of it.
         DescriptionError: if the robot's files are missing or broken.
     """
 
+    @typed("noise", "errors", "estimator")
     def __init__(
         self,
         mjcf: Path | str | None = None,
@@ -101,6 +106,7 @@ class MujocoPlant(Plant):
         robot: str = GO2,
         visuals: bool = False,
         delay: float = 0.0,
+        keyframe: str | None = None,
     ) -> None:
         if sensors not in SENSORS:
             raise ConfigError(unknown_name("sensors", sensors, SENSORS))
@@ -122,6 +128,7 @@ class MujocoPlant(Plant):
             visuals=visuals,
             delay=delay,
             seed=seed,
+            keyframe=keyframe,
         )
         start_rng, self._rng = np.random.default_rng(seed).spawn(2)
         # MuJoCo's warnings would otherwise go to a file in the working directory.
@@ -129,6 +136,7 @@ class MujocoPlant(Plant):
         self._model, self._layout, self._motor, self._description = prepare(setup)
         self._data = mujoco.MjData(self._model)
         self.robot = self._description.profile.name
+        self.model_file = str(Path(mjcf or urdf or "").absolute()) if mjcf or urdf else ""
         if mjcf is not None and joint_dynamics is None:  # of what is built here nobody is told
             self.joint_damping = tuple(self._model.dof_damping[self._layout.joint_v].tolist())
         self._noise = (noise or SensorNoise()) if sensors == "noisy" else None
@@ -144,12 +152,12 @@ class MujocoPlant(Plant):
         self._R_world_base = data.xmat[layout.base].reshape(3, 3)
         self._warnings = data.warning.number
         self._bind_kernels()
-        settle(self._model, data, layout, setup, start_rng)
-        # One period in the lying state, so that the first read has forces and torques.
+        resting = settle(self._model, data, layout, setup, start_rng)
+        # One period in the resting state, so that the first read has forces and torques.
         self._senses: Proprioception | None = None
         self._state: RobotState | None = None
         self._imu: ImuSample | None = None
-        self.write(JointCommand.damping(LYING_DAMPING))
+        self.write(resting)
         self._ticks, self._data.time = 0, 0.0
         if sensors == "imu":
             errors = errors or SensorErrors()
@@ -220,6 +228,7 @@ class MujocoPlant(Plant):
             self._truth = RobotState(self.time, q, v, self._tau.copy(), forces, touching)
         return self._truth
 
+    @typed(late=True)
     def write(self, command: JointCommand) -> None:
         """Applies ``command`` for one control period, with the motor law at every physics step.
 
@@ -248,7 +257,9 @@ class MujocoPlant(Plant):
             mujoco.mj_step1(model, data)
         self._tau = total / self._substeps if shares is None else total * shares / self._substeps
         self._ticks += 1
-        self._check_physics()
+        if np.count_nonzero(self._warnings):
+            raised = [mujoco.mju_warningText(int(i), 0) for i in np.flatnonzero(self._warnings)]
+            raise PlantError(f"physics failed at t={self.time:.3f} s: {'; '.join(raised)}")
         self._sense()
 
     def imu(self) -> ImuSample:
@@ -259,6 +270,7 @@ class MujocoPlant(Plant):
             self._imu = sample if noise is None else noise.corrupt_imu(sample, self._rng)
         return self._imu
 
+    @typed(error=CommandError, late=True)
     def push(self, force: Float[np.ndarray, "3"], duration: float, at: str = "base") -> None:
         """Pushes the robot, starting now; pushes overlay.
 
@@ -274,15 +286,14 @@ class MujocoPlant(Plant):
         self._check_open()
         self._pushes.add(force, duration, at)
 
+    @typed(error=CommandError, late=True)
     def fault(
         self, kind: str, part: str = "", at: float | None = None, value: float | None = None
     ) -> None:
         """Breaks a part of the robot, for tests and experiments.
 
         Args:
-            kind: one of ``go2_wbc.plant.faults.FaultKind``: ``"motor"``, ``"encoder"``,
-                ``"encoder_stuck"``, ``"foot_force"``, ``"gyro"``, ``"accelerometer"``,
-                ``"foot_held"``, ``"not_a_number"``, ``"lost_packets"``.
+            kind: a value of ``go2_wbc.plant.faults.FaultKind``, such as ``"motor"``.
             part: a joint (``"FL_calf_joint"``), a foot (``"FL_foot"``) or an axis (``"x"``).
             at: plant time [s]; now, unless said.
             value: what the part gives, or errs by; see ``FaultKind``.
@@ -307,6 +318,7 @@ class MujocoPlant(Plant):
         watch = self._senses or self._faults.watch
         return () if watch is None else watch.faults
 
+    @typed(late=True)
     def place(self, q: Float[np.ndarray, "19"], v: Float[np.ndarray, "18"] | None = None) -> None:
         """Moves the robot to a state at once, for tests and experiments; time stands still.
 
@@ -386,6 +398,7 @@ class MujocoPlant(Plant):
             faults=self._faults.save(),
         )
 
+    @typed(late=True)
     def restore(self, saved: SavedPhysics) -> None:
         """Goes back to a state that ``save`` of this plant, or of one built alike, returned."""
         self._check_open()
@@ -459,13 +472,6 @@ class MujocoPlant(Plant):
         rows = (contact.geom, contact.efc_address, contact.dim, data.efc_force)
         bin_forces(*rows, codes, self._is_elliptic, forces)
         return forces
-
-    def _check_physics(self) -> None:
-        """Raises ``PlantError`` if MuJoCo warned about anything."""
-        counts = self._warnings
-        if np.count_nonzero(counts):
-            raised = [mujoco.mju_warningText(int(i), 0) for i in np.flatnonzero(counts)]
-            raise PlantError(f"physics failed at t={self.time:.3f} s: {'; '.join(raised)}")
 
 
 def _numbers_of(command: JointCommand) -> Float[np.ndarray, "5 12"]:

@@ -18,6 +18,7 @@ from go2_wbc.errors import CommandError, unknown_name
 from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.plant.mujoco.layout import MujocoLayout
 from go2_wbc.robot.description import BASE_LINK
+from go2_wbc.validation import LARGEST
 
 STIFFNESS, DAMPING = 1e4, 50.0
 """k [N/m] and d [N s/m] of a held foot: 2 cm at 200 N, and stable for a calf at steps of 2 ms."""
@@ -60,7 +61,7 @@ class Pushes:
         f_world = np.array(force, dtype=float)
         if f_world.shape != (3,) or not np.isfinite(f_world).all():
             raise CommandError(f"push force must be three finite numbers [N], got {force!r}")
-        if not (np.isfinite(duration) and duration > 0.0):
+        if not 0.0 < duration <= LARGEST:
             raise CommandError(f"push duration must be positive and finite [s], got {duration!r}")
         body, point = self._point(at)
         steps = max(1, round(duration / self._model.opt.timestep))

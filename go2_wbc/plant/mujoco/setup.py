@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import ConfigError, DescriptionError, ModelMismatch
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.mujoco.layout import MujocoLayout, find_layout, foot_geoms
@@ -30,6 +31,7 @@ from go2_wbc.world import RANGES
 DEFAULT_FRICTION = 0.8
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(
     NOT_NEGATIVE,
@@ -60,6 +62,7 @@ class PlantSetup:
     visuals: bool
     delay: float
     seed: int
+    keyframe: str | None
 
     def __post_init__(self) -> None:
         for name in ("mjcf", "urdf"):
@@ -77,6 +80,8 @@ class PlantSetup:
                 f"control_period must be an integer multiple of timestep: "
                 f"{self.control_period!r} s is {ratio:.6g} times {self.timestep!r} s"
             )
+        if self.keyframe is not None and (self.mjcf is None or self.initial_yaw):
+            raise ConfigError("keyframe needs an mjcf that has it, and says the initial_yaw, too")
         if self.mjcf is not None and self.terrain is not None:
             raise ConfigError("terrain is only for the built model; put it into the mjcf instead")
 

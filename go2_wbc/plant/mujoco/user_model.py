@@ -4,8 +4,9 @@ The file must have the robot's twelve joints below one body with a free joint, a
 bodies ``FL_foot`` or geoms ``FL_foot`` or ``FL``. Added when absent: a floor, a torque motor for a
 joint that no actuator drives, and the IMU. It must have the size of the robot that is controlled:
 another robot with joints of these names is refused, and named if there is a profile of it.
-Everything else stays as the file says, except that the time step is the plant's and keyframes are
-not used. An actuator that is not a plain torque motor is refused, never replaced.
+Everything else stays as the file says, except that the time step is the plant's. An actuator that
+is not a plain torque motor is refused, never replaced; so are angles that must be degrees, and
+ranges that keep the robot from folding its legs.
 """
 
 from __future__ import annotations
@@ -36,6 +37,9 @@ LENGTH_TOLERANCE = 0.01
 """m; files of one robot by several authors differ by 1 mm, a Go1 from a Go2 by 15."""
 NARROW_RANGE = 0.2
 """rad; ranges in radians that were read as degrees are all narrower, those of a leg wider."""
+RANGE_SLACK = 0.05
+"""rad by which a joint may be beyond its range, of which files of several authors differ."""
+_TURN, _DEGREES = 2.0 * np.pi, "these must be degrees, and the file's angles are in radians"
 SPANS = {
     "from its front to its rear hip": ("FL_hip_joint", "RL_hip_joint"),
     "from its left to its right hip": ("FL_hip_joint", "FR_hip_joint"),
@@ -62,7 +66,9 @@ def load_user_model(
     """
     spec = _read(mjcf)
     problems = _joint_problems(spec) + _foot_problems(spec) + _actuator_problems(spec)
-    problems = problems or _other_robot(_compiled(spec, mjcf), description)
+    if not problems:
+        model = _compiled(spec, mjcf)
+        problems = _other_robot(model, description) or _angle_problems(model, description)
     if problems:
         title = description.profile.title
         listing = "".join(f"\n  - {problem}" for problem in problems)
@@ -174,7 +180,11 @@ def _size_problems(model: mujoco.MjModel, description: RobotDescription) -> list
     mass, usual = float(model.body_subtreemass[base]), description.mass
     problems = []
     if not usual / MASS_RATIO <= mass <= usual * MASS_RATIO:
-        problems.append(f"it weighs {mass:.1f} kg, the robot that is controlled {usual:.1f} kg")
+        heaviest = model.body(int(np.argmax(model.body_mass)))
+        problems.append(
+            f"it weighs {mass:.1f} kg, the robot that is controlled {usual:.1f} kg; the heaviest "
+            f"part is {heaviest.name!r}: {float(heaviest.mass[0]):.1f} kg"
+        )
     anchors = {name: data.xanchor[joint] for name, joint in joints.items()}
     for what, (first, second) in SPANS.items():
         length = float(np.linalg.norm(anchors[first] - anchors[second]))
@@ -188,6 +198,25 @@ def _size_problems(model: mujoco.MjModel, description: RobotDescription) -> list
             f"its joints turn by {widths[is_limited].max():.3f} rad at most: if its angles are in "
             'radians, it needs <compiler angle="radian"/>'
         )
+    return problems
+
+
+def _angle_problems(model: mujoco.MjModel, description: RobotDescription) -> list[str]:
+    """Ranges of joints that cannot be meant, and angles of keyframes outside them."""
+    problems = []
+    keys = [model.key(number) for number in range(model.nkey)]
+    for name, tucked in zip(JOINT_NAMES, description.profile.tucked_joints.tolist(), strict=True):
+        joint = model.joint(name)
+        low, high = joint.range.tolist() if model.jnt_limited[joint.id] else (-_TURN, _TURN)
+        if max(-low, high) > _TURN:
+            problems.append(f"{name} turns from {low:g} to {high:g} rad: {_DEGREES}")
+        elif not low - RANGE_SLACK <= tucked <= high + RANGE_SLACK:
+            problems.append(f"{name} turns from {low:g} to {high:g} rad: lying needs {tucked:g}")
+        for key in keys:
+            angle = float(key.qpos[joint.qposadr[0]])
+            if not low - RANGE_SLACK <= angle <= high + RANGE_SLACK:
+                hint = f": {_DEGREES}" if abs(angle) > _TURN else f", outside {low:g} to {high:g}"
+                problems.append(f"keyframe {key.name!r} has {name} at {angle:g} rad{hint}")
     return problems
 
 

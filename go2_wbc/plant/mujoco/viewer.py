@@ -38,14 +38,18 @@ class PlantViewer:
         plant: what to show; build it with ``visuals=True`` to see the robot's real shape.
 
     Raises:
-        PlantError: if there is no display. MuJoCo itself would end the process.
+        PlantError: if there is no display (MuJoCo itself would end the process), or on macOS
+            outside ``mjpython``.
     """
 
     def __init__(self, plant: MujocoPlant) -> None:
         problem = display_problem()
         if problem is not None:
             raise PlantError(f"cannot open the viewer: {problem}")
-        self._handle: Any = mujoco.viewer.launch_passive(plant.model, plant.data)
+        try:
+            self._handle: Any = mujoco.viewer.launch_passive(plant.model, plant.data)
+        except RuntimeError as error:
+            raise PlantError(f"cannot open the viewer: {error}") from error
         self._shown_at = plant.time
 
     def show(self, time: float) -> None:

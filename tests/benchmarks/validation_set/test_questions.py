@@ -1,12 +1,9 @@
 """The exam's motions: every family writes, at any amplitude, and the halves stay apart."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest
 
-from benchmarks.validation_set.causes import examples
 from benchmarks.validation_set.drawing import TEST, TRAIN, Draw, Family
 from benchmarks.validation_set.questions import (
     BORDER,
@@ -23,7 +20,7 @@ from benchmarks.validation_set.questions import (
     questions,
 )
 from go2_wbc.robot.model import RobotModel
-from motions import Timeline, compile_timeline
+from motions import compile_timeline
 
 LEAST, LEAST_DYNAMIC = 600, 100
 FLIP = 1.0
@@ -120,9 +117,3 @@ def test_the_numbers_of_a_draw_depend_on_family_and_number_only() -> None:
     first = [Draw("a", 0).between(0.0, 1.0) for _ in range(2)]
     assert first[0] == first[1]
     assert len({first[0], Draw("a", 1).between(0.0, 1.0), Draw("b", 0).between(0.0, 1.0)}) == 3
-
-
-def test_every_known_cause_has_examples() -> None:
-    found = examples()
-    assert len({question.family.name for question in found}) >= 6
-    assert all(isinstance(question.line, Timeline) for question in found)

@@ -1,7 +1,5 @@
 """Random sentences of the motion language: the same ones every time, and rows of a sweep."""
 
-from __future__ import annotations
-
 import json
 from itertools import pairwise
 

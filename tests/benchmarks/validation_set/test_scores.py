@@ -1,7 +1,5 @@
 """How often verdicts foretell physics: shares, their intervals, the table."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

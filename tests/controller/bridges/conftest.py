@@ -1,7 +1,5 @@
 """Every test of the bridges talks on the loopback only, in a ROS domain of its own."""
 
-from __future__ import annotations
-
 import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import closing

@@ -3,8 +3,6 @@
 Importing this module needs no ROS: ``needs_ros2`` skips what does.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import tempfile

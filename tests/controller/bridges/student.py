@@ -1,7 +1,5 @@
 """A class as a student of the course writes it: plain rclpy, one service client, one publisher."""
 
-from __future__ import annotations
-
 import rclpy
 from geometry_msgs.msg import Twist
 from quadropted_msgs.srv import RobotBehaviorCommand

@@ -1,7 +1,5 @@
 """What can be ordered over ROS 2, carried out by a job server. No ROS is needed."""
 
-from __future__ import annotations
-
 import logging
 import math
 import sys

@@ -1,7 +1,5 @@
 """The client, alone and against a server; and a student's own class."""
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess

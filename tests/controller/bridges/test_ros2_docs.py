@@ -1,7 +1,5 @@
 """The picture of a ROS 2 call in the documentation names what there is. No ROS is needed."""
 
-from __future__ import annotations
-
 import ast
 import re
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Without the extra the bridge says what is missing, and everything else goes on."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A namespace belongs to one process of a machine, until that ends. No ROS is needed."""
 
-from __future__ import annotations
-
 import os
 import sys
 

@@ -1,7 +1,5 @@
 """The course's own package builds in a colcon workspace, and its commands and tests run."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import shutil

@@ -1,7 +1,5 @@
 """The server as others see it: plain rclpy in another process than the robot's."""
 
-from __future__ import annotations
-
 import math
 import signal
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Running ``go2-wbc`` in this process."""
 
-from __future__ import annotations
-
 from typing import NamedTuple, Protocol
 
 import pytest

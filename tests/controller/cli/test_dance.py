@@ -1,7 +1,5 @@
 """``go2-wbc dance``: composed, checked, played, measured; every way to fail has its message."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path
@@ -21,9 +19,9 @@ SECONDS, BPM = 7.0, 96.0
 @pytest.fixture
 def song(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A song whose beats are known, not found: what follows needs no extra."""
-    clicks = click_track(BPM, SECONDS)
-    found = Beats(BPM, clicks.beats, np.ones(len(clicks.beats)), SECONDS, 1.0)
-    monkeypatch.setattr("motions.music.beat_tracking.beats", lambda _: found)
+    clicks = click_track(BPM, SECONDS, metre=3)
+    found = Beats(BPM, clicks.beats, np.ones(len(clicks.beats)), SECONDS, 1.0, metre=3)
+    monkeypatch.setattr("motions.music.beat_tracking.beats", lambda *_: found)
     return clicks.save(tmp_path / "song.wav")
 
 
@@ -46,6 +44,10 @@ def test_the_page_of_a_dance_has_its_beats_and_its_music(
     header, arrays = read_data(page.read_text(encoding="utf-8"))
     assert header["title"] == "dance 0"
     assert header["beats"] == pytest.approx(click_track(BPM, SECONDS).beats)
+    assert header["bar"] == [3, 0]
+    names = [label for _, _, label in header["labels"]]
+    told = json.loads(run("dance", song, "--no-play", "--json").out)
+    assert names == [told["dance"], *(move["name"] for move in told["moves"])]
     path = tmp_path / "again.mp3"
     path.write_bytes(arrays["sound"].tobytes())
     assert len(read_sound(path)) == pytest.approx(SECONDS * RATE, abs=1)
@@ -53,7 +55,7 @@ def test_the_page_of_a_dance_has_its_beats_and_its_music(
 
 def test_without_playing_the_moves_and_their_times_are_told(song: Path, run: Run) -> None:
     text = run("dance", song, "--no-play", "--moves", "nod", "sway", "tap_FR").out
-    assert all(word in text for word in ("96 a minute", "feasible, not played", "nod"))
+    assert all(word in text for word in ("96 a minute, bars of 3", "feasible, not played", "nod"))
     assert "twist" not in text
     assert "accents" not in json.loads(run("dance", song, "--no-play", "--json").out)
 

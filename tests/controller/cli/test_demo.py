@@ -1,10 +1,7 @@
 """``go2-wbc demo``: what a person sees, what a program reads, and which files are left."""
 
-from __future__ import annotations
-
 import json
 import os
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -22,9 +19,8 @@ from go2_wbc.config import Config
 from go2_wbc.errors import ConfigError, PlantTimeout
 from tests.controller.cli.conftest import Run, Said
 from tests.controller.fake_go2 import FakeGo2
+from tests.script_server import run_script
 
-ROOT = Path(__file__).resolve().parents[3]
-PROGRAM = (sys.executable, "-m", "controller.cli.main")
 NO_DISPLAY = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
@@ -236,22 +232,15 @@ def test_a_run_without_these_moments_leaves_the_choice_to_the_filmstrip() -> Non
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
-    [[], ["--backend", "placo"], ["--backend", "full", "--solver", "proxqp"]],
-    ids=["default", "placo", "full proxqp"],
+    [[], ["--backend", "full", "--solver", "proxqp"]],
+    ids=["default", "full proxqp"],
 )
 def test_the_real_demo_does_every_step_inside_the_limits(
     tmp_path: Path, options: list[str]
 ) -> None:
     environment = {name: v for name, v in os.environ.items() if name not in NO_DISPLAY}
-    done = subprocess.run(
-        [*PROGRAM, "demo", "--no-media", "--viewer", "--out", ".", *options],
-        cwd=tmp_path,
-        env={**environment, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"},
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        check=False,
-    )
+    words = ["demo", "--no-media", "--viewer", "--out", ".", *options]
+    done = run_script(["-m", "controller.cli.main", *words], tmp_path, environment)
     assert done.returncode == ExitCode.OK, done.stdout + done.stderr
     assert done.stdout.count("✓") == 8
     assert "going on without it" in done.stderr

@@ -1,7 +1,5 @@
 """The table and the progress line of the demo fit their terminal and leave nothing out."""
 
-from __future__ import annotations
-
 import math
 import sys
 

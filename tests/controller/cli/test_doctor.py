@@ -1,7 +1,5 @@
 """The doctor finds each known illness, names the line that cures it, and likes a healthy body."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import json
 import sys
@@ -197,6 +195,21 @@ def test_a_missing_display_is_a_note_and_never_a_problem(
     system: str, environment: dict[str, str], status: Status
 ) -> None:
     assert doctor.judge_display(system, environment).status is status
+
+
+@pytest.mark.parametrize(
+    ("system", "machine", "status", "told"),
+    [
+        ("linux", "x86_64", Status.OK, "tested"),
+        ("linux", "aarch64", Status.NOTE, "untested on Linux, aarch64"),
+        ("darwin", "arm64", Status.NOTE, "untested on macOS, arm64"),
+        ("win32", "AMD64", Status.PROBLEM, "work in WSL"),
+    ],
+)
+def test_the_system_is_known(system: str, machine: str, status: Status, told: str) -> None:
+    finding = doctor.judge_system(system, machine)
+    assert finding.status is status
+    assert told in finding.detail
 
 
 # --- the report ---------------------------------------------------------------------------------

@@ -1,7 +1,5 @@
 """``go2-wbc identify-friction``: a table, and a file that the controller takes."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -55,8 +53,6 @@ def test_a_program_can_read_it(found: list[Plant], run: Run) -> None:
 
 
 def test_a_file_that_cannot_be_driven_is_refused(tmp_path: Path, run: Run) -> None:
-    said = run(
-        "identify-friction", "--mjcf", tmp_path / "none.xml", "--json", code=ExitCode.RUNTIME
-    )
+    said = run("identify-friction", "--mjcf", tmp_path / "none.xml", "--json", code=ExitCode.USAGE)
     assert "no such file" in said.err
     assert said.out == ""

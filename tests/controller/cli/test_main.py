@@ -1,7 +1,6 @@
 """The command line finds its commands, and every way to fail has its message and exit code."""
 
-from __future__ import annotations
-
+import logging
 import os
 import shlex
 import subprocess
@@ -14,6 +13,7 @@ import pytest
 
 from controller.cli import main as cli
 from controller.cli.common import ExitCode
+from controller.pacing import REASON
 from go2_wbc import errors
 from tests.controller.cli.conftest import Run
 from tests.controller.sweeps import swept
@@ -22,8 +22,22 @@ ROOT = Path(__file__).resolve().parents[3]
 COLUMNS = 80
 HEAVY = {"numpy", "pinocchio", "placo", "mujoco", "meshcat", "proxsuite", "jaxtyping", "qpsolvers"}
 
-USAGE, FAILED = ExitCode.USAGE, ExitCode.FAILED
+USAGE = ExitCode.USAGE
 TRIAL = f"{swept.__name__}:trial"
+
+NEEDED = {
+    "completion": "bash",
+    "certify": "bow",
+    "dance": "song.wav",
+    "export": "bow --out bow.csv",
+    "new": "greet",
+    "preview": "bow",
+    "replay": "bow.sqlite 3",
+    "run": "bow",
+    "sweep": "bow",
+    "unitree-drive": "--interface lo",
+}
+"""The least that commands must be given."""
 
 Action = Callable[[], int]
 
@@ -129,10 +143,10 @@ def test_no_command_shows_the_help_as_a_usage_error(run: Run) -> None:
         ("certify bow --html page.txt", USAGE, "valid: .html"),
         ("check levitate", USAGE, "unknown motion 'levitate'; valid: beckon"),
         ("check nod --payload -1", USAGE, "World.payload must be between 0 and 12, got -1"),
-        ("check nowhere.py", FAILED, "there is no file nowhere.py"),
-        ("check wave --set times=99", FAILED, "times must be 1 to 8, got 99"),
+        ("check nowhere.py", USAGE, "there is no file nowhere.py"),
+        ("check wave --set times=99", USAGE, "times must be 1 to 8, got 99"),
         ("check wave --set times", USAGE, "set by NAME=VALUE, got 'times'"),
-        ("check wave --set x=1", FAILED, "unknown parameter 'x'"),
+        ("check wave --set x=1", USAGE, "unknown parameter 'x'"),
         ("dance song.wav --html dance.txt", USAGE, "valid: .html"),
         ("dance song.wav --seed -1", USAGE, "must be a whole number of 0 or more, got '-1'"),
         ("demo --friction 0", USAGE, "--friction: must be a positive number, got '0'"),
@@ -152,7 +166,7 @@ def test_no_command_shows_the_help_as_a_usage_error(run: Run) -> None:
         ("preview bow --plot bow", USAGE, "no suffix; valid: .svg, .png"),
         ("preview bow --port http", USAGE, "must be a port from 0 to 65535, got 'http'"),
         ("preview bow --port 65536", USAGE, "must be a port from 0 to 65535"),
-        ("preview bow --html bow.html --set angle=9", FAILED, "angle must be 0.1 to 0.45"),
+        ("preview bow --html bow.html --set angle=9", USAGE, "angle must be 0.1 to 0.45"),
         ("preview levitate --no-open", USAGE, "unknown motion 'levitate'; valid: beckon"),
         ("sweep no_such", USAGE, "unknown motion 'no_such'"),
         (f"sweep {TRIAL} --n 0", USAGE, "n must be a whole number, at least 1, got 0"),
@@ -191,23 +205,61 @@ def test_the_exit_code_of_a_command_is_passed_on(act: Callable[[Action], None], 
         (errors.StanceMismatch("sits"), ExitCode.FAILED),
         (errors.QpInfeasible("daqp", "infeasible"), ExitCode.FAILED),
         (errors.IkError("0.4 m off"), ExitCode.FAILED),
+        (errors.PlanNotFound("no jump"), ExitCode.FAILED),
+        (errors.DynamicMotionRefused("a robot"), ExitCode.FAILED),
         (errors.CommandError("nan"), ExitCode.USAGE),
+        (errors.TimelineError("hold(-1)"), ExitCode.USAGE),
+        (errors.MotionFileError("bow.plan is damaged"), ExitCode.USAGE),
+        (errors.ModelMismatch("no such joint"), ExitCode.USAGE),
         (errors.ConfigError("unknown key"), ExitCode.USAGE),
         (errors.SolverUnavailable("unknown QP solver"), ExitCode.USAGE),
         (errors.PlantTimeout("silent"), ExitCode.RUNTIME),
         (errors.MissingDependency("pip install x"), ExitCode.RUNTIME),
+        (errors.SweepError("a worker died"), ExitCode.RUNTIME),
+        (errors.BridgeError("no ROS"), ExitCode.RUNTIME),
+        (errors.ModeError("lying"), ExitCode.RUNTIME),
         (FileNotFoundError(2, "No such file or directory", "bow.py"), ExitCode.RUNTIME),
     ],
     ids=lambda value: type(value).__name__,
 )
-def test_an_expected_error_is_a_message_and_an_exit_code_without_traceback(
-    act: Callable[[Action], None], run: Run, error: Exception, code: ExitCode
+def test_an_expected_error_is_one_message_and_an_exit_code_whatever_the_command(
+    monkeypatch: pytest.MonkeyPatch, run: Run, error: Exception, code: ExitCode
 ) -> None:
-    act(failing(error))
-    said = run("act", code=code)
-    assert said.out == ""
-    assert said.err.startswith("go2-wbc: ")
-    assert "Traceback" not in said.err
+    def fail(*_: object) -> int:
+        raise error
+
+    monkeypatch.setattr("controller.cli.options._called", fail)
+    assert set(NEEDED) <= {command.name for command in cli.COMMANDS}
+    for command in cli.COMMANDS:
+        said = run(command.name, *NEEDED.get(command.name, "").split(), code=code)
+        assert said.out == ""
+        assert said.err == f"go2-wbc: {_told(error)}\n"
+
+
+def _told(error: Exception) -> str:
+    return f"{error.filename}: {error.strerror}" if isinstance(error, OSError) else str(error)
+
+
+@pytest.mark.parametrize("command", cli.COMMANDS, ids=lambda command: command.name)
+def test_every_command_refuses_what_is_no_option_and_asks_for_what_it_needs(
+    command: cli.Command, run: Run
+) -> None:
+    words = NEEDED.get(command.name, "").split()
+    assert "--nonsense" in run(command.name, *words, "--nonsense", code=USAGE).err
+    if words:
+        assert "arguments are required" in run(command.name, code=USAGE).err
+
+
+@pytest.mark.parametrize(
+    ("level", "message", "is_shown"),
+    [(logging.WARNING, REASON, False), (logging.INFO, REASON, True), (logging.WARNING, "?", True)],
+)
+def test_why_something_ended_is_said_once_and_logged_only_for_who_wants_to_know(
+    caplog: pytest.LogCaptureFixture, level: int, message: str, *, is_shown: bool
+) -> None:
+    record = logging.LogRecord("controller.loop", logging.WARNING, "", 0, message, (), None)
+    with caplog.at_level(level, "controller.loop"):
+        assert cli._is_news(record) is is_shown
 
 
 def test_a_missing_library_points_to_the_doctor(act: Callable[[Action], None], run: Run) -> None:

@@ -1,7 +1,5 @@
 """``go2-wbc preview``: the files it writes, what it refuses, and the life of the live page."""
 
-from __future__ import annotations
-
 import json
 import os
 import socket

@@ -1,7 +1,5 @@
 """A function is a subcommand: what it takes is what the command line takes, in its help as said."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass

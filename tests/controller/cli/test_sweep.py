@@ -1,7 +1,5 @@
 """``go2-wbc sweep``: what is printed and written, which exit code."""
 
-from __future__ import annotations
-
 import csv
 import json
 from functools import partial
@@ -62,6 +60,14 @@ def test_a_plot_shows_rates_and_numbers(name: str, sweep: Run) -> None:
     if name.endswith(".svg"):
         words = Path(name).read_text(encoding="utf-8")
         assert all(word in words for word in ("share of the runs", ">norm<", "6 seeds"))
+
+
+def test_a_plot_over_a_column_shows_the_relation(sweep: Run) -> None:
+    sweep(TRIAL, "--n", 6, "--plot", "over.svg", "--over", "norm")
+    words = Path("over.svg").read_text(encoding="utf-8")
+    assert all(word in words for word in (">norm<", "rate, 95 %", "6 seeds"))
+    told = sweep(TRIAL, "--n", 6, "--over", "norm", code=ExitCode.USAGE)
+    assert "give --plot FILE, too" in told.err
 
 
 def test_seeds_that_fail_are_told_and_are_a_failure(sweep: Run) -> None:

@@ -1,7 +1,5 @@
 """Functions that the tests sweep: quick, and known for every seed."""
 
-from __future__ import annotations
-
 import math
 import os
 import re

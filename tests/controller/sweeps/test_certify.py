@@ -1,7 +1,5 @@
 """Certificates: counted in random worlds, the same however they are run, and judged by truth."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Workers are forked from one process, and are as if each had been started anew."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import signal

@@ -1,7 +1,5 @@
 """Rows from a real Ray cluster of two nodes on the loopback: the same, also if one is killed."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from functools import partial

@@ -1,7 +1,5 @@
 """A row is plain values by name, and says so where it is not."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Motions, gaits and pushes over seeds, in real physics; and a row that is looked at again."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Rates and means with intervals that hold what they say."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """A sweep gives every row once, whatever carries it, ends it, or goes wrong in it."""
 
-from __future__ import annotations
-
 import os
 import random
 import signal

@@ -1,7 +1,5 @@
 """The file of a sweep: keeps every bit, once, and refuses what is something else."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import sqlite3

@@ -1,7 +1,5 @@
 """Trials draw what they say."""
 
-from __future__ import annotations
-
 import pytest
 
 from controller.sweeps.trials import (

@@ -1,7 +1,5 @@
 """The active-set method, on QPs so small that the conditions of optimality say it all."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import nnls

@@ -1,7 +1,5 @@
 """Rotation vectors and quaternions are scipy's."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

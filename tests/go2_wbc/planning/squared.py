@@ -1,7 +1,5 @@
 """Snapshots of a robot that stands squarely, for the tests of the planner."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

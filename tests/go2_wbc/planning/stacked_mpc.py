@@ -1,7 +1,5 @@
 """The MPC of the trunk with the nodes' states stacked, everything a matrix."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Velocity commands: what is refused, and how the envelope clips."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 import sys

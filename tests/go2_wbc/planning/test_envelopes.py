@@ -1,7 +1,5 @@
 """The measured envelopes of the gaits, and the choice of a gait by the speed."""
 
-from __future__ import annotations
-
 from dataclasses import astuple, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the MPC looks at: where the feet will be of a robot that a push has thrown."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from go2_wbc.contacts import GAITS

@@ -1,7 +1,5 @@
 """A gait becomes another at any moment, and no foot notices but by when it lands."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise

@@ -192,9 +192,9 @@ def sliding(
     return snapshot.replaced(state=state, v_world_contacts=v)
 
 
-def look(slip: Slip, snapshot: Snapshot, *, steps: bool = True) -> None:
+def look(slip: Slip, snapshot: Snapshot, *, steps: bool = True, beside: bool = False) -> None:
     state = snapshot.state
-    observe_slip(slip, snapshot, state.feet_in_contact, state.tau, STANCE, steps, TICK)
+    observe_slip(slip, snapshot, state.feet_in_contact, state.tau, STANCE, steps, beside, TICK)
 
 
 def after(snapshot: Snapshot, seconds: float) -> Slip:
@@ -281,6 +281,22 @@ def test_the_friction_comes_back_slowly() -> None:
     for _ in range(500):
         look(slip, sliding(0.0))
     assert slip.friction == pytest.approx(low + FRICTION_RISE, abs=1e-6)
+
+
+def test_a_gait_beside_the_com_counts_on_the_ground_until_a_foot_has_slid() -> None:
+    """With 0.2 a bound that turned at once fell in 15 of 16 runs, with this in none."""
+    slip, holds = Slip(friction=0.2), sliding(0.0)
+    look(slip, holds)
+    assert slip.friction == pytest.approx(0.2, abs=0.01)
+    look(slip, holds, beside=True)
+    assert slip.friction == MOST_FRICTION
+    slip = after(sliding(0.3), 0.2)
+    look(slip, holds, beside=True)
+    assert slip.has_slid
+    assert slip.friction < 0.2
+    slip.friction = MOST_FRICTION
+    look(slip, holds)
+    assert not slip.has_slid
 
 
 def test_a_robot_that_only_stands_shows_nothing_of_the_friction() -> None:

@@ -1,7 +1,5 @@
 """The locomotion planner on synthetic snapshots: when it steps, where to, and what it asks."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

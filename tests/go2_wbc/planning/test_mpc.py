@@ -1,7 +1,5 @@
 """The MPC is held to the program with stacked matrices, solved by another solver."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

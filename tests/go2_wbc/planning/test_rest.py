@@ -1,7 +1,5 @@
 """Coming to rest: on which feet a walk ends, where its trunk goes then, and why it does not."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """The trunk's way: its pose while walking, and its reference on a slope."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -90,8 +88,8 @@ def test_a_pose_beyond_the_envelope_is_refused_with_every_bound_that_it_breaks()
 @pytest.mark.parametrize(
     ("bounds", "told"),
     [
-        ({"lowest": 0.01}, "lowest must be 0 or below, got 0.01"),
-        ({"lowest": -math.inf}, "lowest must be 0 or below, got -inf"),
+        ({"lowest": 0.01}, "lowest must be between -1 and 0, got 0.01"),
+        ({"lowest": -math.inf}, "lowest must be between -1 and 0, got -inf"),
         ({"roll": -0.1}, "PoseEnvelope.roll"),
     ],
 )

@@ -1,7 +1,5 @@
 """What every plant must do; a plant's tests inherit the suite and provide the fixture ``plant``."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What several plant tests use: a standing pose, standing up, flying, and momentum."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 

@@ -1,10 +1,5 @@
 """Settings and robot files that make no sense are refused by errors of our own, by name."""
 
-from __future__ import annotations
-
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,8 +7,7 @@ import pytest
 
 from go2_wbc.errors import DescriptionError
 from go2_wbc.robot.description import find_description
-
-ROOT = Path(__file__).resolve().parents[3]
+from tests.pages import run_python
 
 WRONG = """
 from go2_wbc.errors import ConfigError
@@ -51,16 +45,9 @@ for name, call in refused.items():
 """
 
 
-def test_settings_out_of_range_or_of_another_type_are_refused_by_name() -> None:
+def test_settings_out_of_range_or_of_another_type_are_refused_by_name(tmp_path: Path) -> None:
     # In a process of its own: under pytest the run-time type checks would refuse some first.
-    done = subprocess.run(
-        [sys.executable, "-c", WRONG],
-        cwd=ROOT,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run_python(WRONG, tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
 
 

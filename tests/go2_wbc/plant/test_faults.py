@@ -1,7 +1,5 @@
 """What is broken on a simulated robot reads, or gives, what was said; what cannot be is refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

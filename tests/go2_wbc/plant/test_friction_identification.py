@@ -1,7 +1,5 @@
 """Identified friction: near the plant's own, ready for the configuration, refused where wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

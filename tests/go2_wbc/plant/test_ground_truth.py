@@ -1,7 +1,5 @@
 """Ground truth is what the simulator holds, one row per tick, and changes nothing."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

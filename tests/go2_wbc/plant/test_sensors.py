@@ -1,7 +1,5 @@
 """What a robot that lives on its own sensors is given: late, in steps, biased."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The simulated robot in a world is the one that Pinocchio computes with; commands come late."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 import pytest

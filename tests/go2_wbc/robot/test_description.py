@@ -1,7 +1,5 @@
 """The description finds the Go2's real files and refuses what is not a Go2."""
 
-from __future__ import annotations
-
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The state estimator against MuJoCo's truth, with the controller living on it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

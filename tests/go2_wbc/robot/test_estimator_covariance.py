@@ -1,7 +1,5 @@
 """How sure the estimator is of the base: its algebra by finite differences, and against truth."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

@@ -6,8 +6,6 @@ of ``robot.estimator`` (Kalman, J. Basic Eng. 82, 1960; Sola, *Quaternion kinema
 error-state Kalman filter*, 2017, sec. 7).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -5,8 +5,6 @@ The trunk sways and turns every way at once while three feet roll on the ground;
 the air and kicks. The joints' rates follow from the feet's Jacobians, and nothing of the filter.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whole-body poses: reached as asked, or refused with numbers."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How late commands act is found from what motors give, and the state carried on by that."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

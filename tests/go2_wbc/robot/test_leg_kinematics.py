@@ -1,7 +1,5 @@
 """Legs and CoM of many configurations against Pinocchio."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

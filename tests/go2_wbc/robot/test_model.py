@@ -1,7 +1,5 @@
 """The robot model: limits, masses and kinematics, and which descriptions it refuses."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

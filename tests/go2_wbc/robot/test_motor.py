@@ -3,8 +3,6 @@
 What plants and telemetry make of it in every tick is held to numpy's interpolation of the line.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A motor is judged by what it was asked for and what it gave."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -42,7 +40,7 @@ def test_a_broken_motor_is_named_once(share: float, what: str, late: int) -> Non
 
 
 def test_a_motor_of_which_little_is_asked_is_not_judged() -> None:
-    assert watched(0.0, amplitude=0.15).faults == ()
+    assert watched(0.0, amplitude=0.03).faults == ()
 
 
 def test_a_motor_is_not_asked_for_more_than_it_can_give() -> None:

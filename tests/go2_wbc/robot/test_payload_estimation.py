@@ -1,7 +1,5 @@
 """What a robot carries is felt as it is; what it does not carry is not believed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What makes a robot this one is data, and every model of it is made of the same."""
 
-from __future__ import annotations
-
 import pickle
 import xml.etree.ElementTree as ET
 from pathlib import Path

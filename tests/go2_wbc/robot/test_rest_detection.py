@@ -1,7 +1,5 @@
 """The state estimator of a robot that tumbles, falls on its back, or begins in the air."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The snapshot of a Go2 is what Pinocchio's own functions say."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

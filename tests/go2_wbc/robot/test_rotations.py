@@ -1,7 +1,5 @@
 """Rotations against Pinocchio, and their derivatives against finite differences."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

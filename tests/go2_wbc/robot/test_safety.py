@@ -1,7 +1,5 @@
 """What is no state, and what is a fall: tilt at once, a trunk too low or aslant after a while."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import mujoco

@@ -1,7 +1,5 @@
 """What is read off a measured state, and the snapshot, against Pinocchio."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

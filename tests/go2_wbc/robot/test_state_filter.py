@@ -1,7 +1,5 @@
 """What the comparison with the documented filter (``test_estimator_equations``) does not tell."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 

@@ -1,7 +1,5 @@
 """A plan's feet land when they meet the ground; its time and its tempo stay what they are."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a plan asks for at an instant: scipy's splines and rotations, and the load's ramp."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import replace
 from typing import Any

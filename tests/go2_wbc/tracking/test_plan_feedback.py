@@ -1,7 +1,5 @@
 """A solved plan's feedback: what its torques do to the trunk while the feet on the ground stay."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

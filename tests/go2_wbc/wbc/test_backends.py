@@ -1,7 +1,5 @@
 """The back ends: physics, optimality and agreement on random problems in every contact mode."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -3,8 +3,6 @@
 Nothing here may hang, end in torques that are no numbers, or be noticed by one way and not another.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field, fields, replace
 from typing import Any

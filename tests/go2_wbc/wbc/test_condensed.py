@@ -5,8 +5,6 @@ Pinocchio. What is proved here is the elimination, the cost, the bounds in the u
 active-set method.
 """
 
-from __future__ import annotations
-
 import inspect
 from dataclasses import dataclass, replace
 

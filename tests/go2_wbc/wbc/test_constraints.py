@@ -1,7 +1,5 @@
 """Constraints: their rows mean what they say, for random motions, forces and joint states."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

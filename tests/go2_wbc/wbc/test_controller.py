@@ -1,7 +1,5 @@
 """The whole-body controller: a stand, its mirror image, hard demands, limits and refusals."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

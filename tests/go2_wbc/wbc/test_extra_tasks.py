@@ -1,7 +1,5 @@
 """Tasks of a user's own, beside the built-in ones."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The expected load of standing feet, and what it does to the forces along the ground."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

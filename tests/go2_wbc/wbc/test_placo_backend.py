@@ -1,7 +1,5 @@
 """PlaCo's dynamics solver as an oracle: the same QP, formulated by somebody else."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

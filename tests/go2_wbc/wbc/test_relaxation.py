@@ -1,7 +1,5 @@
 """An answer where the constraints contradict each other: physical, within the motors, nearest."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Dense QP solvers: each meets the optimality conditions on its own, and they agree."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Tasks: A z - b is the acceleration of what they track, minus the one their law asks for."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

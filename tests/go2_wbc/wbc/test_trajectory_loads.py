@@ -1,7 +1,5 @@
 """Shares of the load along a trajectory: balance, contact Jacobians, and compiled against plain."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

@@ -1,7 +1,5 @@
 """Solved once for all tests: a jump, a rear and a lift, each a second of processor time."""
 
-from __future__ import annotations
-
 import pytest
 
 from go2_wbc.legs import Leg
@@ -15,11 +13,6 @@ PROBLEMS = {
     "rear": PhaseProblem(phase_builders.rear()),
     "lift": PhaseProblem(phase_builders.lift((Leg.FR, Leg.RL))),
 }
-
-
-@pytest.fixture(scope="session")
-def model() -> RobotModel:
-    return RobotModel()
 
 
 @pytest.fixture(scope="session")

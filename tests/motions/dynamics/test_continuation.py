@@ -1,7 +1,5 @@
 """A plan as the start for another: at the same knots it is itself, and it saves iterations."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Between knots a plan moves as its own accelerations say: nothing is invented."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A plan survives a file; what is no plan is refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -31,6 +29,8 @@ def test_a_plan_comes_back_from_its_bytes() -> None:
     for name in ("times", "q", "v", "tau", "forces", "stance", "gains", "p_feet"):
         assert np.array_equal(getattr(copy, name), getattr(PLAN, name))
     assert (copy.iterations, copy.cost, copy.misses) == (7, 0.25, MISSES)
+    small = DynamicTrajectory.from_bytes(PLAN.to_bytes(is_small=True))
+    assert small.gains.dtype == np.float64, "they are kept in 16 bits, and reckoned with in 64"
 
 
 def test_a_damaged_file_is_refused() -> None:

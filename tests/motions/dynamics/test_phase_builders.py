@@ -1,7 +1,5 @@
 """Builders of phases put the feet where they say, and refuse what no Go2 can do."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

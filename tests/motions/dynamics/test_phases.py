@@ -1,7 +1,5 @@
 """Phases that make no motion are refused with what is wrong."""
 
-from __future__ import annotations
-
 import math
 import pickle
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The audit of a plan finds every way in which one can be broken."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 

@@ -1,7 +1,6 @@
 """A plan is solved once, whatever happens to the folder that keeps it."""
 
-from __future__ import annotations
-
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -92,6 +91,34 @@ def test_a_kept_plan_is_judged_by_the_tolerance_of_today(
     with pytest.raises(PlanNotFound, match="nearest one is off"):
         plan_cache.solve_cached(strict, model, folder=tmp_path)
     assert solver.calls == 1
+
+
+def test_that_there_is_no_plan_is_kept_for_the_tolerance_that_was_asked(
+    model: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[PhaseProblem] = []
+
+    def fail(problem: PhaseProblem, *_: object, **__: object) -> DynamicTrajectory:
+        asked.append(problem)
+        raise PlanNotFound("no dynamic plan", ["torque of FL_calf", "friction"])
+
+    def refusal(problem: PhaseProblem) -> PlanNotFound:
+        with pytest.raises(PlanNotFound) as told:
+            plan_cache.solve_cached(problem, model, folder=tmp_path)
+        return told.value
+
+    monkeypatch.setattr(plan_cache, "solve", fail)
+    first, began = refusal(PROBLEM), time.thread_time()
+    again = refusal(PROBLEM)
+    assert time.thread_time() - began < 0.05
+    assert (str(again), again.reasons) == (str(first), first.reasons)
+    assert len(asked) == 1
+    refusal(replace(PROBLEM, tolerance=Tolerance(position=0.2)))
+    assert len(asked) == 2
+    for kept in tmp_path.iterdir():
+        kept.write_text("[")
+    refusal(PROBLEM)
+    assert len(asked) == 3
 
 
 def test_a_doctored_plan_is_found_out(solver: Solver, model: RobotModel, tmp_path: Path) -> None:

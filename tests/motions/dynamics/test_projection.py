@@ -1,7 +1,5 @@
 """What was written without regard to physics becomes the nearest motion that obeys it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

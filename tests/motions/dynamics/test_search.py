@@ -1,9 +1,9 @@
 """A search leaves nothing behind, and goes on until a plan turns as it was asked to."""
 
-from __future__ import annotations
-
 import gc
+import logging
 import math
+import time
 import weakref
 from collections.abc import Iterator
 from dataclasses import replace
@@ -107,7 +107,7 @@ def test_a_solution_that_does_not_turn_is_left_for_the_next_start(model: RobotMo
             return answers.pop(0)
 
         search = Search(
-            soft, full, knots, is_good=lambda _: False, turns=turns, budget=20.0, progress=None
+            soft, full, knots, objections=lambda _: ["no"], turns=turns, budget=20.0, progress=None
         )
         return search.run().iterations
 
@@ -137,6 +137,21 @@ def test_the_first_guess_turns_in_the_air_as_far_as_was_asked(
     assert turned[-1] - turned[0] == pytest.approx(yaw)
     in_flight = turned[1:][flight][-1] - turned[:-1][flight][0]
     assert abs(in_flight) > 0.5 * abs(yaw)
+
+
+def test_what_binds_is_said_within_a_second_and_what_is_tried(
+    model: RobotModel, caplog: pytest.LogCaptureFixture
+) -> None:
+    from motions.dynamics.search import FIRST_ANSWER
+
+    impossible = PhaseProblem(phase_builders.jump(height=0.4))
+    began = time.thread_time()
+    with caplog.at_level(logging.INFO), pytest.raises(PlanNotFound):
+        solve(impossible, model, budget=FIRST_ANSWER + 0.2)
+    assert time.thread_time() - began < 2.0  # with all that is made before and after
+    told = [record.message for record in caplog.records]
+    assert any("trying to begin from a guess" in line for line in told)
+    assert any("no plan yet; what binds: " in line and "torque share" in line for line in told)
 
 
 def test_once_round_in_four_hops_is_found(model: RobotModel) -> None:

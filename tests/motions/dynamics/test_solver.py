@@ -1,7 +1,5 @@
 """Plans obey the equations of motion and every limit, computed here without the planner's code."""
 
-from __future__ import annotations
-
 import math
 import sys
 

@@ -1,7 +1,5 @@
 """Movements to be judged."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from go2_wbc.robot.model import RobotModel

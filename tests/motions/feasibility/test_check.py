@@ -1,7 +1,5 @@
 """A plan that breaks a limit is refused, with the limit, the part, the time and the amount."""
 
-from __future__ import annotations
-
 import inspect
 
 import numpy as np

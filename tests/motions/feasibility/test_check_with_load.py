@@ -1,7 +1,5 @@
 """The world reaches the equations of the check, and the report says which one it holds for."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What the check works out on its way, in the form of a recorded run."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Self-collision along a motion: what is left out cannot have been the nearest pair."""
 
-from __future__ import annotations
-
 import os
 from collections import Counter
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Dynamic spans are judged by their own dynamics: what is broken in a good plan is found."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 

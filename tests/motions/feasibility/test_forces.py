@@ -1,7 +1,5 @@
 """Contact forces of a motion: what they must be, and what another solver says they are."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

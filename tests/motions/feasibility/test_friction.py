@@ -1,7 +1,5 @@
 """Friction that a motion needs, how far feet slide, and how far the trunk lags."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """``physics="nearest"``: what the robot cannot do is done nearly, with its deviation told."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

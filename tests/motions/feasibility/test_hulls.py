@@ -1,7 +1,5 @@
 """Heights over the ground: of every point of every link, by another way to find them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import coal

@@ -1,7 +1,5 @@
 """Checks without forces: what is looked at, and when."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The chance of a motion: rises with every margin, multiplies causes, survives extremes."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

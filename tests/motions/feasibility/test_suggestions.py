@@ -1,7 +1,5 @@
 """Suggestions: the least change of each kind, and what is pasted is what was checked."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 
@@ -11,6 +9,7 @@ from go2_wbc.errors import CommandError
 from motions import (
     CompiledPlan,
     FeasibilityChecker,
+    FeasibilityReport,
     Suggestion,
     Timeline,
     compile_timeline,
@@ -26,6 +25,7 @@ from motions.feasibility.suggestions import (
     SHIFT_TIME,
     TEMPO,
 )
+from motions.language.keys import PhaseKey
 
 CHECKER = FeasibilityChecker()
 FAST_TWIST = Timeline(name="twist").body(yaw=deg(25), over=0.12).home(over=0.12)
@@ -81,6 +81,20 @@ def test_nothing_is_suggested_for_what_is_feasible_or_for_what_cannot_be_mended(
     assert suggest(FEASIBLE, checker=CHECKER) == ()
     hopeless = Timeline().leg("FL", hip=0.0, thigh=-2.0, calf=-0.2, over=0.5).hold(0.5)
     assert suggest(hopeless, checker=CHECKER) == ()
+
+
+def test_the_nearest_lower_jump_is_found_in_few_tries(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[float] = []
+
+    def report(line: Timeline, _: FeasibilityChecker) -> FeasibilityReport | None:
+        (jump,) = line.in_order(PhaseKey)
+        tried.append(max(z for phase in jump.phases for _, _, z in phase.feet.values()))
+        return CHECKER.check(FEASIBLE) if tried[-1] < 0.19 else None
+
+    monkeypatch.setattr("motions.feasibility.suggestions._report", report)
+    (only,) = suggest(Timeline().jump(height=0.4), checker=CHECKER)
+    assert (only.kind, only.call) == ("jump", ".scale_jumps(0.45)")
+    assert len(tried) < 10
 
 
 def test_a_plan_has_no_calls_to_change() -> None:

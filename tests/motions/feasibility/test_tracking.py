@@ -1,7 +1,5 @@
 """How far the trunk is off its plan, held to what MuJoCo's was in motions drawn for that alone."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

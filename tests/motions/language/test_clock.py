@@ -1,7 +1,5 @@
 """Beats as a measure of time: a steady tempo, and the beats of a song."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

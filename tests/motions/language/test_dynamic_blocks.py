@@ -1,7 +1,5 @@
 """Calls whose motion is solved: what they write, and what they refuse."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from itertools import pairwise

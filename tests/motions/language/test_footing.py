@@ -1,7 +1,5 @@
 """Footing: the places of the feet between and after steps, and the frame that the trunk follows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

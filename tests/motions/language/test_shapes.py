@@ -1,7 +1,5 @@
 """Paths through points, gaze, single joints, own easing, and whole motions changed."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -13,7 +11,7 @@ from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.rotations import yaw_rotation
 from motions import FeasibilityChecker, Timeline, deg, load_motion
 from motions.language.footing import Footing
-from motions.language.keys import JointKey
+from motions.language.keys import JointKey, PhaseKey
 from motions.plan.trajectory import trajectory_of
 from motions.postures import standing_feet
 from tests.motions.plans import MODEL, curves_at, plan_of
@@ -139,6 +137,27 @@ def test_longer_shifts_delay_what_follows_and_stretch_what_goes_on_meanwhile() -
     )
     walked = Timeline().walk(x=0.1).foot("FR", z=0.05, over=0.7).home(over=0.7)
     assert walked.scale_shifts(2.0).end_pose == pytest.approx(walked.end_pose)
+
+
+def test_smaller_jumps_are_lower_and_shorter_and_what_follows_comes_sooner() -> None:
+    big = Timeline().jump(x=0.4, yaw=0.5, height=0.32).body(z=-0.03, over=0.5).home(over=0.5)
+    small = Timeline().jump(x=0.2, yaw=0.5, height=0.16).body(z=-0.03, over=0.5).home(over=0.5)
+    halved = big.scale_jumps(0.5)
+    assert halved.end == pytest.approx(small.end)
+    assert halved.end < big.end
+    (jumped,), (asked,) = halved.in_order(PhaseKey), small.in_order(PhaseKey)
+    assert jumped.shift == pytest.approx(asked.shift)
+    for phase, wanted in zip(jumped.phases[2:4], asked.phases[2:4], strict=True):
+        assert phase.duration == pytest.approx(wanted.duration)
+        assert [place[2] for place in phase.feet.values()] == pytest.approx(
+            [place[2] for place in wanted.feet.values()]
+        )
+    others = (
+        [repr(key) for key in line.keys if key not in (jumped, asked)] for line in (halved, small)
+    )
+    assert next(others) == next(others)
+    with pytest.raises(TimelineError, match="needs a dynamic block"):
+        NOD.scale_jumps(0.5)
 
 
 def test_backwards_a_motion_passes_the_same_places_in_turn() -> None:

@@ -1,7 +1,5 @@
 """Steps: where feet land, what counts from there, and that the robot does it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

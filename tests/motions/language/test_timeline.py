@@ -1,7 +1,5 @@
 """The authoring language: cursor, tracks, joining, mirror images, and what it refuses."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The high five leads back the way it came."""
 
-from __future__ import annotations
-
 import pytest
 
 from go2_wbc.errors import TimelineError

@@ -1,7 +1,5 @@
 """Looking around goes where its description says."""
 
-from __future__ import annotations
-
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rpy_from_rotation
 from motions import compile_timeline, load_motion

@@ -3,8 +3,6 @@
 Tempi and seeds are others than those on which the beat finder was tuned.
 """
 
-from __future__ import annotations
-
 import sys
 import wave
 from pathlib import Path
@@ -54,6 +52,20 @@ def test_every_beat_of_a_made_song_is_found(seed: int, tmp_path: Path) -> None:
     distances = np.abs(song.beats[:, None] - found.times).min(axis=1)
     assert distances.max() < NEAR
     assert len(found.times) - len(song.beats) in (0, 1)  # one may be counted as the song dies away
+
+
+@pytest.mark.parametrize("metre", [3, 4])
+@pytest.mark.parametrize("seed", [7101, 7102])
+def test_a_waltz_is_a_waltz(metre: int, seed: int, tmp_path: Path) -> None:
+    """Its bars are found, and where they begin; and it can be said what they are."""
+    song = made_song(96.0, 20.0, seed, metre)
+    found = beats(saved(song, tmp_path))
+    assert found.metre == metre
+    firsts = found.times[found.downbeat :: metre]
+    assert np.abs(song.beats[::metre][:, None] - firsts).min(axis=0).max() < NEAR
+    assert beats(saved(song, tmp_path), 7 - metre).metre == 7 - metre
+    cut = song.samples[round((song.beats[1] - 0.2) * RATE) :]  # it begins on the second beat
+    assert beats(sound(cut, tmp_path)).downbeat == metre - 1
 
 
 def test_a_file_of_two_channels_at_another_rate_is_read(tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """Dances: on the beats of any song, different by seed, feasible, and never the same move twice."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -14,23 +12,30 @@ from motions import FeasibilityChecker
 from motions.language.keys import BodyKey, LegKey
 from motions.music import MOVES, Beats, compose, feasible_dance
 from motions.music.choreography import LEAD, pulses_of
-from motions.music.dance_moves import Strokes
+from motions.music.dance_moves import WALTZ, Strokes
 
 CHECKER = FeasibilityChecker()
 TEMPI = (55.0, 83.0, 110.0, 139.0, 176.0)
 EXACT = 1e-9
 
 
-def steady(bpm: float, seconds: float = 30.0, strengths: Sequence[float] = (1.0,)) -> Beats:
+def steady(
+    bpm: float,
+    seconds: float = 30.0,
+    strengths: Sequence[float] = (1.0,),
+    metre: int = 1,
+    downbeat: int = 0,
+) -> Beats:
     times = np.arange(0.4, seconds - 0.1, 60.0 / bpm)
     strong = np.resize(np.array(strengths), len(times))
-    return Beats(bpm, times, strong, seconds, 1.0)
+    return Beats(bpm, times, strong, seconds, 1.0, metre, downbeat)
 
 
+@pytest.mark.parametrize("metre", [1, 4])
 @pytest.mark.parametrize("bpm", TEMPI)
-def test_half_a_minute_has_twenty_moves_at_any_tempo(bpm: float) -> None:
+def test_half_a_minute_has_twenty_moves_at_any_tempo(bpm: float, metre: int) -> None:
     for seed in range(5):
-        dance = compose(steady(bpm), seed)
+        dance = compose(steady(bpm, metre=metre), seed)
         assert len(dance.moves) >= 20
         assert dance.timeline.end <= 30.0 + 60.0 / bpm
 
@@ -65,21 +70,61 @@ def test_a_seed_is_a_dance_and_no_move_follows_itself() -> None:
 def test_one_dances_on_the_strong_beats_of_a_fast_song() -> None:
     """A song that was counted twice as fast as it is played is danced on its beats."""
     fast = steady(160.0, strengths=(0.2, 1.0))
-    assert pulses_of(fast) == pytest.approx(fast.times[1::2])
+    assert pulses_of(fast).times == pytest.approx(fast.times[1::2])
     slow = steady(90.0, strengths=(0.2, 1.0))
-    assert pulses_of(slow) == pytest.approx(slow.times)
+    assert pulses_of(slow).times == pytest.approx(slow.times)
+
+
+@pytest.mark.parametrize("downbeat", range(3))
+@pytest.mark.parametrize("bpm", TEMPI)
+@pytest.mark.parametrize("metre", [3, 4])
+def test_moves_begin_with_the_bars(metre: int, bpm: float, downbeat: int) -> None:
+    """A long one on the first beat of a bar; the others do not go across the end of theirs."""
+    found = steady(bpm, metre=metre, downbeat=downbeat)
+    pulses, firsts = pulses_of(found), found.times[downbeat::metre]
+    assert pulses.times[pulses.downbeat :: pulses.bar][0] in firsts
+    for seed in range(3):
+        dance = compose(found, seed)
+        begun = 0
+        for item in dance.moves:
+            start = dance.pulses[item.pulse]
+            end = start + (item.move.pulses(pulses.usual) - 0.5) * pulses.usual
+            begins = np.abs(firsts - start).min() < EXACT
+            begun += begins
+            assert begins or not np.any((firsts > start) & (firsts < end))
+        assert begun >= 0.6 * (len(firsts) / max(pulses.usual * bpm / 60.0 / metre, 1.0) - 2)
+
+
+def test_a_waltz_has_moves_of_three_and_a_fast_one_is_danced_in_ones() -> None:
+    waltz, other = (compose(steady(90.0, metre=metre), 0).moves for metre in (3, 4))
+    assert {item.move.name for item in waltz} >= set(WALTZ)
+    assert not {item.move.name for item in other} & set(WALTZ)
+    fast = steady(170.0, metre=3, downbeat=1)
+    assert pulses_of(fast).times == pytest.approx(fast.times[1::3])
+    twice = pulses_of(steady(140.0, metre=6, downbeat=1))  # counted twice as fast as it is played
+    assert twice.times == pytest.approx(steady(140.0).times[1::2])
+    assert (twice.bar, twice.downbeat) == (3, 0)
+
+
+def test_where_no_move_may_begin_is_a_rest() -> None:
+    """Two beats of sway leave the third one of a waltz."""
+    dance = compose(steady(90.0, metre=3), 0, ["sway"])
+    starts = np.array([item.pulse for item in dance.moves])
+    assert np.unique(np.diff(starts)).tolist() == [3]
+    assert CHECKER.evaluate(dance.timeline).report.ok
 
 
 def test_a_beat_that_comes_too_soon_is_left_out() -> None:
     times = np.sort(np.append(np.arange(1.0, 20.0, 0.75), 5.9))
     found = Beats(80.0, times, np.ones(len(times)), 20.0, 1.0)
-    assert len(pulses_of(found)) == len(times) - 1
+    assert len(pulses_of(found).times) == len(times) - 1
 
 
+@pytest.mark.parametrize("metre", [1, 3, 4])
 @pytest.mark.parametrize("bpm", TEMPI)
-def test_a_dance_of_all_moves_is_feasible(bpm: float) -> None:
-    for seed in range(3):
-        _, checked = feasible_dance(steady(bpm), seed, CHECKER)
+def test_a_dance_of_all_moves_is_feasible(bpm: float, metre: int) -> None:
+    for seed in range(3 if metre == 1 else 1):
+        _, checked = feasible_dance(steady(bpm, metre=metre), seed, CHECKER)
         assert checked.report.ok
 
 

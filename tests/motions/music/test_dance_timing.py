@@ -1,7 +1,5 @@
 """When accents happened: turning points of the trunk and touchdowns, in a run made by hand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Songs made by code: their beats are where they sound, and the same seed is the same song."""
 
-from __future__ import annotations
-
 import io
 import wave
 from pathlib import Path

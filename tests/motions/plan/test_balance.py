@@ -1,7 +1,5 @@
 """Before a foot is raised, the trunk moves until the CoM is over the others."""
 
-from __future__ import annotations
-
 import pytest
 
 from go2_wbc.geometry import support_margins

@@ -1,7 +1,5 @@
 """The sway of the CoM: inside of its margins where it can be, least bad where it cannot."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a plan asks for at every instant: of its curves, its contacts, and many samples at once."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Where a compiled plan has feedback gains of its own, and what they are for."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

@@ -3,8 +3,6 @@
 Work is counted, not timed: samples evaluated, poses solved, robots loaded.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable
 from importlib import import_module

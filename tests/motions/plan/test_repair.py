@@ -1,7 +1,5 @@
 """What is mended of a motion: the parts that break a limit, from rest to rest, and nothing else."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Plans of what is written and what is solved: continuous, in place, and told what cannot be."""
 
-from __future__ import annotations
-
 import sys
 from itertools import pairwise
 

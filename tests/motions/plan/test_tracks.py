@@ -1,7 +1,5 @@
 """Tracks of the legs: where a foot is between two keys, and by how much it misses its place."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from go2_wbc.legs import Leg

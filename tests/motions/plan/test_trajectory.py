@@ -1,7 +1,5 @@
 """Velocities and accelerations of a trajectory are the derivatives of what they belong to."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

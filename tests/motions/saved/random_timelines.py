@@ -1,7 +1,5 @@
 """Timelines of all kinds of calls, for hypothesis; not all of them can be done by the robot."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A motion that was saved is the same motion when it is loaded, or the reason why not is said."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -211,7 +209,7 @@ def test_the_commands_write_and_take_saved_motions(
     assert load_motion(path) == load_motion("nod", times=2)
     assert main(["check", str(path)]) == ExitCode.OK
     assert "the robot can do it" in capsys.readouterr().out
-    assert main(["check", str(path), "--set", "times=3"]) == ExitCode.FAILED
+    assert main(["check", str(path), "--set", "times=3"]) == ExitCode.USAGE
     assert "has no parameters" in capsys.readouterr().err
-    assert main(["check", str(tmp_path / "none.json")]) == ExitCode.FAILED
+    assert main(["check", str(tmp_path / "none.json")]) == ExitCode.USAGE
     assert "there is no file" in capsys.readouterr().err

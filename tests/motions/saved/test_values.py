@@ -1,7 +1,5 @@
 """Numbers, words and dataclasses as JSON: what comes back, and what is refused."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The animation file: as many frames, as long and as small as promised."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The picture of the margins, and what it says."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree

@@ -1,7 +1,5 @@
 """Welding, normals and simplification on shapes that are known in closed form."""
 
-from __future__ import annotations
-
 import numpy as np
 import trimesh
 

@@ -1,7 +1,5 @@
 """The rasteriser against brute force and against geometry known in closed form."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

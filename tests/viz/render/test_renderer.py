@@ -1,7 +1,5 @@
 """What a rendered picture must show: feet on the floor, a shadow under the robot, a sky."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

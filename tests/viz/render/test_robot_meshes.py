@@ -1,16 +1,22 @@
 """The robot's looks against Pinocchio's own loader and against its mirror image."""
 
-from __future__ import annotations
+import logging
+from dataclasses import replace
+from pathlib import Path
 
+import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
 
+from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import LEGS
+from go2_wbc.plant.mujoco.model import JointDynamics, build_spec
+from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
-from go2_wbc.robot.profile import find_profile
+from go2_wbc.robot.profile import find_profile, profile_names
 from viz.render.mesh import arrow
-from viz.render.robot_meshes import PosedRobot, load_robot_visuals
+from viz.render.robot_meshes import PosedRobot, load_robot_visuals, visuals_of
 
 FOOT_RADIUS = find_profile().foot_radius
 
@@ -90,3 +96,55 @@ def test_an_arrow_is_as_long_as_asked_and_faces_outward() -> None:
     assert volume > 0
     agree = np.sum(faces * made.normals[made.triangles].mean(axis=1), axis=1)
     assert np.all(agree[solid] > 0)
+
+
+@pytest.mark.parametrize("robot", sorted({*profile_names()} - {"go2"}))
+def test_another_robot_is_drawn_as_itself(robot: str, recording: Recording) -> None:
+    """Its soles lie where its own legs put them, which are not those of a Go2."""
+    visuals = visuals_of(replace(recording, robot=robot))
+    posed, radius = PosedRobot(visuals), find_profile(robot).foot_radius
+    feet = posed.feet(_STAND)
+    assert np.abs(feet - PosedRobot(load_robot_visuals()).feet(_STAND)).max() > 0.005
+    lowest = posed.at(_STAND).points[:, 2].min()
+    assert lowest == pytest.approx(feet[:, 2].min() - radius, abs=2 * _MESH_ERROR)
+
+
+@pytest.fixture(scope="module")
+def own_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A Go2 with its usual looks, a capsule on its back, and frames of its own."""
+    spec = build_spec(find_description(), JointDynamics(), friction=0.7, visuals=True)
+    box, capsule = mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_CAPSULE
+    base = spec.body("base")
+    base.add_geom(type=capsule, size=[0.05, 0.1, 0.0], pos=[0.0, 0.0, 0.2], rgba=[1, 0, 0, 1])
+    spec.worldbody.add_geom(type=box, size=[0.1, 0.1, 2.0], pos=[3.0, 0.0, 2.0])
+    base.pos, base.quat = [1.0, 2.0, 0.5], [0.6, 0.0, 0.0, 0.8]
+    spec.compile()
+    path = tmp_path_factory.mktemp("own") / "own.xml"
+    path.write_text(spec.to_xml(), encoding="utf-8")
+    return path
+
+
+def test_a_users_file_is_drawn_with_all_that_it_shows_of_the_robot(
+    own_file: Path, recording: Recording
+) -> None:
+    """The same meshes in the same places as from the URDF, and the capsule; not the world's box."""
+    own = PosedRobot(visuals_of(replace(recording, model_file=str(own_file)))).at(_STAND)
+    usual = PosedRobot(load_robot_visuals()).at(_STAND)
+    assert own.points[:, 2].max() == pytest.approx(0.3 + 0.2 + 0.1 + 0.05, abs=1e-3)
+    is_red = (own.colors[:, 0] > 0.99) & (own.colors[:, 1] < 0.2)
+    body = own.points[np.unique(own.triangles[~is_red])]
+    assert body.min(axis=0) == pytest.approx(usual.points.min(axis=0), abs=1e-3)
+    assert body.max(axis=0) == pytest.approx(usual.points.max(axis=0), abs=1e-3)
+
+
+def test_a_file_that_is_gone_or_broken_is_said(
+    tmp_path: Path, recording: Recording, caplog: pytest.LogCaptureFixture
+) -> None:
+    gone = replace(recording, model_file=str(tmp_path / "gone.xml"))
+    with caplog.at_level(logging.WARNING):
+        assert visuals_of(gone) is visuals_of(recording)
+    assert "gone.xml is gone: the robot is drawn as any go2" in caplog.text
+    broken = tmp_path / "broken.xml"
+    broken.write_text("<mujoco/>", encoding="utf-8")
+    with pytest.raises(DescriptionError, match=r"broken.xml"):
+        visuals_of(replace(recording, model_file=str(broken)))

@@ -1,7 +1,5 @@
 """The filmstrip: one telling panel for each behaviour, nothing outside the recording."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

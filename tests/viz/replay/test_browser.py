@@ -1,8 +1,7 @@
 """The replay page in a real Chromium, from a file, offline."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -126,3 +125,38 @@ def test_every_place_where_a_foot_came_down_has_its_footprint(
         for t in (0.2, 0.9, recording.duration)
     ]
     assert landed == [4, sum(start <= 0.9 for start in prints), len(prints)]
+
+
+_LEAST_CONTRAST = 4.5
+"""Of text on its ground, as WCAG 2.1 asks for (AA)."""
+_CONTRASTS = """(() => {
+    const numbers = (color) => color.match(/[\\d.]+/g).map(Number);
+    const light = (rgb) => rgb.slice(0, 3).map((v) => v / 255)
+      .map((v) => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+      .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+    const ground = (item) => {
+      const own = numbers(getComputedStyle(item).backgroundColor);
+      return own.length < 4 || own[3] > 0.5 ? own : ground(item.parentElement);
+    };
+    return Object.fromEntries(["h1", "#behaviour", "#toggles .on", "#toggles :not(.on)", ".card h2",
+      ".card output", "#clock", "#legend"].map((name) => {
+        const item = document.querySelector(name);
+        const [a, b] = [light(numbers(getComputedStyle(item).color)), light(ground(item))];
+        return [name, (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05)];
+      }));
+})()"""
+
+
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+def test_text_is_readable_and_the_picture_fits_the_page_by_night_and_by_day(
+    browser: Tab, scheme: Literal["dark", "light"]
+) -> None:
+    """The page begins anew when the scheme changes: its canvases have the colours of one."""
+    browser.page.emulate_media(color_scheme=scheme)
+    browser.page.reload()
+    browser.wait_for("window.replay")
+    contrasts = browser.evaluate(_CONTRASTS)
+    assert {name: c for name, c in contrasts.items() if c < _LEAST_CONTRAST} == {}
+    brightness = browser.stage().mean()
+    assert (brightness < 110) if scheme == "dark" else (brightness > 180)
+    assert browser.complaints == []

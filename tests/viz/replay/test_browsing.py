@@ -1,7 +1,5 @@
 """Where there is no browser, its tests are skipped, or fail if one is required."""
 
-from __future__ import annotations
-
 import pytest
 
 from tests.viz.replay import browsing

@@ -39,7 +39,9 @@ def test_the_page_follows_every_save(tmp_path: Path, chromium_browser: Browser) 
 
         file.write_text(BROKEN, encoding="utf-8")
         browser.wait_for(f"!{_ERROR}.hidden")
-        assert "rise.py, line 9: SyntaxError" in browser.evaluate(f"{_ERROR}.textContent")
+        told = browser.evaluate(f"{_ERROR}.textContent")
+        assert "rise.py, line 9: SyntaxError" in told
+        assert "is the last version that compiled, which the robot cannot do." in told
         assert "broken" in browser.evaluate(_BADGE)
 
         file.write_text(GOOD, encoding="utf-8")

@@ -1,7 +1,5 @@
 """A page with verdict and ghost in a real Chromium: findings in red, jumps, margins, the ghost."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from dataclasses import replace
@@ -329,7 +327,23 @@ def test_beats_are_lines_on_the_time_strip_that_never_crowd(browser: Tab) -> Non
     assert len(crowd) > 20
 
 
-@pytest.mark.parametrize(("width", "height"), [(1280, 800), (640, 860), (420, 800)])
+_OVERLAPS = """(() => {
+    const shown = [...document.querySelectorAll(
+        "header > *, #toggles > button, aside > *, #controls > *, #timeline")]
+      .filter((item) => item.textContent.trim() + item.id && item.checkVisibility());
+    const boxes = shown.map((item) => [item, item.getBoundingClientRect()]);
+    return boxes.flatMap(([a, p], i) => boxes.slice(i + 1)
+      .filter(([b, q]) => !a.contains(b) && p.width && q.width
+        && Math.min(p.right, q.right) - Math.max(p.left, q.left) > 1
+        && Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top) > 1)
+      .map(([b]) => `${a.outerHTML.slice(0, 60)} and ${b.outerHTML.slice(0, 60)}`));
+})()"""
+"""What is written or pressed, and covers other such."""
+
+
+@pytest.mark.parametrize(
+    ("width", "height"), [(1280, 800), (640, 860), (420, 800), (844, 390), (667, 375)]
+)
 def test_the_page_fits_its_window(browser: Tab, width: int, height: int) -> None:
     browser.resize(width, height)
     app = "document.getElementById('app')"
@@ -338,6 +352,7 @@ def test_the_page_fits_its_window(browser: Tab, width: int, height: int) -> None
         browser.evaluate(f"replay.openTab('{tab}')")
         browser.evaluate(DRAWN)
         assert browser.evaluate(overflow) is False
+        assert browser.evaluate(_OVERLAPS) == []
     pane = browser.evaluate("replay.scene.pane.clientHeight")
     assert pane > 200
     assert browser.complaints == []

@@ -1,9 +1,8 @@
 """The live page's server: only for this machine, only three answers."""
 
-from __future__ import annotations
-
 import http.client
 import json
+import re
 import socket
 import sys
 import threading
@@ -139,11 +138,16 @@ def test_what_is_published_is_told_and_served(server: PreviewServer, recording: 
     assert first["error"] is None
     server.publish_error("line 3: oops")
     second = json.loads(server.next_state(json.dumps(first)) or "")
-    assert second == {"version": first["version"], "error": "line 3: oops"}
+    assert (second["version"], second["error"]) == (first["version"], "line 3: oops")
+    told = r"Broken since \d\d:\d\d:\d\d\. What is shown is the last version that compiled{}\."
+    assert re.fullmatch(told.format(""), second["title"])
     server.publish(ReplayContent(recording, verdict=made_up_verdict(recording.duration)))
     third = json.loads(server.next_state(json.dumps(second)) or "")
     assert third["version"] != first["version"]
-    assert third["error"] is None
+    assert (third["error"], third["title"]) == (None, "")
+    server.publish_error("oops")
+    fourth = json.loads(server.next_state(json.dumps(third)) or "")
+    assert re.fullmatch(told.format(", which the robot cannot do"), fourth["title"])
     block = f'<script type="text/plain" id="replay-data">{_ask(server, "GET /data")[1]}</script>'
     header, _ = read_pack(packed_parts(block)["replay-data"])
     assert header["version"] == third["version"]

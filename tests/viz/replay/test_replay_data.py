@@ -1,7 +1,5 @@
 """The reduction of a recording for the page keeps what matters."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The music on the page of a dance, in a real Chromium."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,12 +1,14 @@
 "use strict";
 // Flat drawings over time: the label strip, the contact strip and the curves.
 
-const INK = "#1f2937", MUTED = "#6b7280", LINE = "#e3e8f0", ACCENT = "#2563eb", BAD = "#dc2626";
+const [INK, MUTED, LINE, SOFT, ACCENT, BAD] = ["ink", "muted", "line", "soft", "accent", "bad"].map(css);
 const FONT = "Inter, system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
 const WARN = "#f59e0b", GHOST = "#7c93d6", WRITTEN = "#a8713a";
 const BEAT_ROOM = 7; // px, least distance of two lines of the beats
 const LANE = 9; // px, height of the strip that shows when limits are broken
-const LABEL_COLORS = ["#dbe6ff", "#fde9cf", "#d5f2e3", "#fbdcea", "#e6e0fb", "#d7eff5"];
+const LABEL_COLORS = IS_DARK.matches
+  ? ["#2c3f6e", "#5a4320", "#1f4d3a", "#5a2c43", "#41356f", "#224b56"]
+  : ["#dbe6ff", "#fde9cf", "#d5f2e3", "#fbdcea", "#e6e0fb", "#d7eff5"];
 
 // A canvas with a picture that is drawn once per size, and a cursor drawn over it.
 class TimeCanvas {
@@ -94,16 +96,16 @@ class Timeline extends TimeCanvas {
     this.drawBeats(paint, this.height - axis);
   }
 
-  // The beats that the motion counts in: a line for each, a longer and darker one for every fourth.
-  // Where they would crowd, only every fourth, or sixteenth ... is drawn.
+  // The beats that the motion counts in: a line for each, a longer and darker one where a bar
+  // begins. Where they would crowd, only bars, or every fourth bar (third of a waltz) ... are drawn.
   drawBeats(paint, bottom) {
-    const { beats } = this.data.header;
+    const { beats, bar: [metre, downbeat] } = this.data.header;
     if (beats.length < 2) return;
     const apart = (this.xAt(beats[beats.length - 1]) - this.xAt(beats[0])) / (beats.length - 1);
-    const every = 4 ** Math.max(0, Math.ceil(Math.log(BEAT_ROOM / apart) / Math.log(4)));
+    const every = metre ** Math.max(0, Math.ceil(Math.log(BEAT_ROOM / apart) / Math.log(metre)));
     paint.fillStyle = INK;
-    for (let k = 0; k < beats.length; k += every) {
-      const isFirst = k % (4 * every) === 0;
+    for (let k = downbeat % every; k < beats.length; k += every) {
+      const isFirst = (k - downbeat) % (metre * every) === 0;
       const top = isFirst ? 22 : 26;
       paint.globalAlpha = isFirst ? 0.42 : 0.2;
       paint.fillRect(Math.round(this.xAt(beats[k])) - 0.5, top, 1, bottom - top + (isFirst ? 4 : 0));
@@ -113,7 +115,6 @@ class Timeline extends TimeCanvas {
 
   drawLabels(paint, height) {
     const names = [...new Set(this.data.header.labels.map((span) => span[2]))];
-    paint.font = `600 11px ${FONT}`;
     paint.textBaseline = "middle";
     paint.textAlign = "left";
     for (const [start, end, label] of this.data.header.labels) {
@@ -121,8 +122,7 @@ class Timeline extends TimeCanvas {
       const width = Math.max(room - Math.min(1.5, 0.2 * room), 0.5);
       paint.fillStyle = LABEL_COLORS[names.indexOf(label) % LABEL_COLORS.length];
       roundedBox(paint, x, 0, width, height, 5);
-      const text = readable(label);
-      if (paint.measureText(text).width + 10 > width) continue;
+      const text = fitted(paint, readable(label), width - 4);
       paint.fillStyle = INK;
       paint.fillText(text, x + Math.min(7, (width - paint.measureText(text).width) / 2), height / 2 + 0.5);
     }
@@ -131,7 +131,7 @@ class Timeline extends TimeCanvas {
   // When limits are nearly broken (amber) and broken (red).
   drawAnnotations(paint, top) {
     if (!this.data.annotations.length) return;
-    paint.fillStyle = "#f3f5f9";
+    paint.fillStyle = SOFT;
     paint.fillRect(this.left, top, this.width - this.left - this.right, LANE);
     const sorted = [...this.data.annotations].sort((a, b) => a.is_broken - b.is_broken);
     for (const { is_broken: isBroken, spans } of sorted) {
@@ -152,12 +152,12 @@ class Timeline extends TimeCanvas {
   drawLeg(paint, leg, k, top, height) {
     const { data } = this;
     const color = data.header.leg_colors[k];
-    paint.fillStyle = color;
+    paint.fillStyle = IS_DARK.matches ? INK : color;
     paint.font = `700 11px ${FONT}`;
     paint.textAlign = "left";
     paint.textBaseline = "middle";
     paint.fillText(leg, 4, top + height / 2 + 0.5);
-    paint.fillStyle = "#f3f5f9";
+    paint.fillStyle = SOFT;
     paint.fillRect(this.left, top, this.width - this.left - this.right, height);
     const half = 0.5 / data.rate;
     paint.globalAlpha = 0.22;
@@ -343,6 +343,17 @@ function roundedBox(paint, x, y, width, height, radius) {
   paint.arcTo(x, y + height, x, y, r);
   paint.arcTo(x, y, x + width, y, r);
   paint.fill();
+}
+
+// As much of a text as fits in `room`, small if need be; sets the font. Two letters say nothing.
+function fitted(paint, text, room) {
+  for (const size of [11, 9]) {
+    paint.font = `600 ${size}px ${FONT}`;
+    if (paint.measureText(text).width <= room) return text;
+  }
+  let length = text.length;
+  while (length && paint.measureText(text.slice(0, length)).width > room) length--;
+  return length > 2 ? text.slice(0, length) : "";
 }
 
 function readable(label) {

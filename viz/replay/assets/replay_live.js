@@ -85,7 +85,7 @@ function listen(player) {
       version = player.data.header.version;
       sliders.use(player.data.header);
     }
-    if (state.error) showError("This does not work; the last good version is shown.", state.error);
+    if (state.error) showError(state.title, state.error);
     else showError("", "");
     player.version = version;
   };

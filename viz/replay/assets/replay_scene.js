@@ -10,7 +10,7 @@ const VIEWS = { // azimuth and elevation in degrees, distance in m
 };
 const STEEP = 0.8; // sine of the camera's angle above the floor
 const ORBIT_RATE = 0.25; // rad/s
-const GOOD_COLOR = 0x16a34a, BAD_COLOR = 0xdc2626, INK_COLOR = 0x1f2937;
+const GOOD_COLOR = 0x16a34a, BAD_COLOR = 0xdc2626, INK_COLOR = parseInt(css("ink").slice(1), 16);
 
 class RobotScene {
   constructor(pane, data) {
@@ -110,6 +110,7 @@ class RobotScene {
     root.traverse((item) => {
       if (!item.material) return;
       item.castShadow = item.receiveShadow = false;
+      if (root.name === "com") for (const name of ["color", "emissive"]) item.material[name].setHex(INK_COLOR);
       if (root.name === "contacts") return;
       item.material.depthTest = false;
       item.material.transparent = true; // drawn after all that is solid

@@ -2,18 +2,24 @@
 // Light, floor and horizon around the robot.
 
 const FLOOR_TILE = 0.5; // m, edge of the floor texture's repeat: two by two tiles
-const BACKGROUND = 0xf4f6fa;
+const IS_DARK = matchMedia("(prefers-color-scheme: dark)");
+IS_DARK.addEventListener("change", () => location.reload());
+
+// A colour of the style sheet, which knows whether the page is dark.
+function css(name) {
+  return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+}
 
 class Stage {
   constructor(viewer) {
     this.viewer = viewer;
     const { THREE } = MeshCat;
     for (const name of ["Axes", "Grid"]) viewer.set_property([name], "visible", false);
-    const background = new THREE.Color(BACKGROUND);
+    const background = new THREE.Color(css("horizon"));
     for (const end of ["top_color", "bottom_color"]) {
       viewer.set_property(["Background"], end, background.toArray());
     }
-    viewer.scene.fog = new THREE.Fog(BACKGROUND, 3, 11);
+    viewer.scene.fog = new THREE.Fog(css("horizon"), 3, 11);
     viewer.camera.fov = 32;
     viewer.camera.near = 0.05;
     viewer.camera.far = 60;
@@ -55,9 +61,9 @@ class Stage {
     const canvas = document.createElement("canvas");
     canvas.width = canvas.height = 256;
     const paint = canvas.getContext("2d");
-    paint.fillStyle = "#f7f8fb";
+    paint.fillStyle = css("tile");
     paint.fillRect(0, 0, 256, 256);
-    paint.fillStyle = "#e6eaf1";
+    paint.fillStyle = css("other-tile");
     paint.fillRect(0, 0, 128, 128);
     paint.fillRect(128, 128, 128, 128);
     const texture = new THREE.CanvasTexture(canvas);

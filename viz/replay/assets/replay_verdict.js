@@ -1,7 +1,7 @@
 "use strict";
 // What the check says: the verdict, the findings as a list, and what is left to every limit.
 
-const TIGHT_INK = "#b45309", GOOD = "#16a34a";
+const TIGHT_INK = css("tight-ink"), GOOD = "#16a34a";
 const ZERO_SHARE = 0.22; // least share of a curve's height below the limit, so that it shows
 
 class VerdictPanel {

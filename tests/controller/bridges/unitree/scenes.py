@@ -1,7 +1,5 @@
 """A simulated robot whose state is watched, and what is thrown at it."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """What the tests of the Unitree bridge need: the extra, a domain of their own, foreign peers."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import sys

@@ -1,7 +1,5 @@
 """What reaches the motors of the simulated robot: good commands, or damping. Needs no DDS."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Our controller drives the simulator in another process through ``UnitreePlant``."""
 
-from __future__ import annotations
-
 import itertools
 import socket
 import subprocess

@@ -1,7 +1,5 @@
 """Killed processes, garbage, floods on Unitree's protocol: whatever comes, the robot recovers."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from typing import Final

@@ -1,7 +1,5 @@
 """Other people's programs move our robot: the stock ``SportClient``, the C++ SDK."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """What stands between the controller and a robot's motors. Needs no DDS library."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

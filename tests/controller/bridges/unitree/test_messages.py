@@ -1,7 +1,5 @@
 """Unitree's messages: layout, checksum and wire format. Needs no DDS library."""
 
-from __future__ import annotations
-
 import struct
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The sport service on a robot that obeys the test: order and codes of answers. Needs no DDS."""
 
-from __future__ import annotations
-
 import json
 import threading
 from collections.abc import Callable, Iterator
@@ -37,6 +35,7 @@ class Stage:
         self.robot: Any = create_autospec(SportRobot, instance=True)
         self.robot.state, self.robot.mode = lying_state(0.0), Mode.STANDING
         self.robot.is_locked = self.robot.is_leaning = False
+        self.robot.excess.return_value = 0, ""
         self.robot.pose = LEVEL
         self.robot.unsupported = frozenset({Api.FRONT_JUMP})
         self.robot.damp.side_effect = lambda: self.is_limp.set()

@@ -1,7 +1,5 @@
 """``TrajectoryFollow``: the velocities that lead along a path, for a robot that obeys them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The robot behind the sport service, in simulation at the pace of the wall clock; needs no DDS."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import closing
 

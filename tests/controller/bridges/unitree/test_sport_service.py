@@ -1,7 +1,5 @@
 """Each call of the sport service does what Unitree's does, or is answered why not."""
 
-from __future__ import annotations
-
 import json
 import threading
 import time

@@ -1,7 +1,5 @@
 """A simulated robot, and the same of Pinocchio."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pinocchio as pin

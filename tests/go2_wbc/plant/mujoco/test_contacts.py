@@ -1,7 +1,5 @@
 """Contact forces and pushes of the simulated Go2 obey Newton's laws, checked with Pinocchio."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is read off MuJoCo's memory is what MuJoCo's own functions say."""
 
-from __future__ import annotations
-
 from contextlib import closing
 
 import mujoco

@@ -1,7 +1,5 @@
 """The built MuJoCo model is the URDF, number by number."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The simulated Go2 keeps the plant contract and Pinocchio's conventions, and is repeatable."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -348,3 +346,10 @@ def test_the_viewer_without_a_display_says_so_instead_of_ending_the_process(
         PlantViewer(plant)
     monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
     assert display_problem() is None
+
+    def on_macos(*_: object) -> None:
+        raise RuntimeError("must be run under `mjpython` on macOS")
+
+    monkeypatch.setattr("mujoco.viewer.launch_passive", on_macos)
+    with pytest.raises(PlantError, match=r"cannot open the viewer: .*mjpython"):
+        PlantViewer(plant)

@@ -1,7 +1,5 @@
 """The robot lies down once: later starts continue from what was kept, with the same bits."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A user's own MJCF is driven like the built model, or refused with everything it lacks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 
