@@ -90,7 +90,7 @@ class LocomotionConfig:
 
     height: float = 0.29
     compression: float = 0.004
-    linear_acceleration: float = 5.0
+    linear_acceleration: float = 4.0
     angular_acceleration: float = 4.0
     velocity_feedback: float = 0.12
     stride_margin: float = 0.4
