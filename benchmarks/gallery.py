@@ -38,7 +38,7 @@ STYLE = ShotStyle(
     samples=2,
 )
 """A camera that nearly stands still, so that what moves is the robot."""
-SIZE_LIMIT = 180_000  # Largest loop [bytes]
+SIZE_LIMIT = 400_000  # Largest loop [bytes]
 FILM_SPEED, FILM_RATE = 2.0, 10.0
 """Seconds of the run in a second of the film, and pictures in a second of it."""
 LEAD = 0.6

@@ -150,7 +150,7 @@ def _walked(robot: TrialRobot, speed: float, length: float) -> float:
     """
     plant, go2 = robot.plant, robot.go2
     start, course = plant.truth(), plant.read().yaw
-    most, side = PATIENCE + length / (LEAST_SHARE * abs(speed)), math.copysign(1.0, speed)
+    way, most, side = 0.0, PATIENCE + length / (LEAST_SHARE * abs(speed)), math.copysign(1.0, speed)
     ahead = side * np.array([math.cos(start.yaw), math.sin(start.yaw)])
     way = 0.0
     while (elapsed := plant.time - start.time) <= most:

@@ -28,6 +28,7 @@ PACKAGES = ("controller", "viz", "motions", "go2_wbc")
 LAYER = frozenset(
     f"go2_wbc/{name}.py"
     for name in (
+        "arguments",
         "compilation",
         "lazy",
         "machine_code",

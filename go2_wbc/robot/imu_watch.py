@@ -45,9 +45,9 @@ else they may turn by [rad/s]: one that lies down on slippery ground slides by 0
 JUMP, SEEN, JUMP_LASTS, LONGEST_JUMP = 0.3, 0.4, 0.03, 0.25
 """Change of the gyro from one reading to the next [rad/s] that may be an error; what feet that do
 not jump along have to show of it [m^2/s^2], for how long at least [s], and at most."""
-JUMP_SHARE, NO_JUMP, JUMP_EXPLAINED = (0.7, 1.4), 0.5, 0.7
+JUMP_SHARE, NO_JUMP, JUMP_EXPLAINED = (0.7, 1.4), 0.5, 0.85
 """Range of the share of the jump that they lack, if it is an error; share below which it is none;
-and the share of their squared residual that an error explains: 0.75 to 0.99, others 0.6 at most."""
+and the share of their squared residual that an error explains: 0.97 of most, a slip 0.8."""
 UNSEEN = 0.5
 """m^2 that is added to what feet tell of each axis of the gyro's error, and draws it towards 0: two
 feet tell nothing of a turn about the line between them. A pair adds 0.1 to 0.25 in each tick."""

@@ -15,7 +15,7 @@ from tests.viz.synthetic import synthetic_recording
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 DEMO = DOCS / "images/demo.webp"
 PICTURES = DOCS / "images" / "gallery"
-MOST_BYTES = 3_000_000
+MOST_BYTES = 3_500_000
 LEAST_CONTRAST = 15.0  # of 255; a blank page has 0
 
 
