@@ -40,7 +40,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle
 from go2_wbc.robot.state import JointCommand
 
-FIRST_SEED = 9600
+FIRST_SEED = 9700
 FRICTION, MASS, PLACE, YAW = (0.6, 0.9), (0.9, 1.1), (-0.1, 0.1), (-0.087, 0.087)
 """What is drawn: friction, factor on the masses, place ahead [m], heading [rad]."""
 LEAST_SHARE, BEYOND, PATIENCE = 0.8, 0.5, 0.5

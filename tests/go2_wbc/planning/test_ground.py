@@ -19,6 +19,8 @@ from go2_wbc.planning.ground import (
     ROUGH_HASTE,
     SLIP_SPEED,
     SMOOTH,
+    STEEP,
+    STEEP_FORGETS,
     STUMBLE,
     TOUCHDOWN_MASK,
     Ground,
@@ -94,7 +96,7 @@ def test_it_is_carried_along_with_the_robot() -> None:
 
 
 def test_the_robot_goes_slowly_on_rough_ground_and_for_a_way_after_it() -> None:
-    snapshot, asked = on_plane(SLOPE), np.array([1.2, -0.9, 2.0])
+    snapshot, asked = on_plane(np.zeros(2)), np.array([1.2, -0.9, 2.0])
     ground = plane(snapshot)
     walking = snapshot.replaced(v_world_com=np.array([0.5, 0.0, 0.0]))
     half = 0.5 * CONFIG.way / 0.5  # s, in which half of the way is come
@@ -117,6 +119,11 @@ def test_the_robot_goes_slowly_on_rough_ground_and_for_a_way_after_it() -> None:
     carry_ground(ground, CONFIG, snapshot, 100.0)  # one that stands does not forget
     assert is_rough(ground)
     np.testing.assert_array_equal(told(), asked)
+    ground.roughness = 1.01 * CONFIG.high
+    told()
+    ground.roughness, ground.slope[0] = 0.0, 2.0 * STEEP  # a ramp, that is as feet expect it
+    carry_ground(ground, CONFIG, walking, 1.01 * CONFIG.way / 0.5 / STEEP_FORGETS)
+    assert not is_rough(ground)
 
 
 def test_the_robot_speeds_up_as_the_ground_bears_it() -> None:
