@@ -43,6 +43,9 @@ def test_no_public_value_fills_the_screen(go2: GO2Controller) -> None:
 def test_a_line_says_what_matters(go2: GO2Controller) -> None:
     assert repr(motions.load_motion("wave")) == "Timeline('wave', 6.40 s, 18 moves, stand to stand)"
     assert "'wave', 6.4 s, chance" in repr(motions.check("wave"))
+    steep = motions.check(Timeline(name="dive").body(pitch=deg(60), over=0.3).home(over=0.3))
+    more = len(steep.failures) - 1
+    assert steep.summary() == f"no   dive            {steep.failures[0]}; {more} more limits"
     assert "standing, MujocoPlant" in repr(go2)
     assert "samples" in repr(go2.recording())
     changed = go2_wbc.Config(wbc=WbcConfig(friction=0.5))
