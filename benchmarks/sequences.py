@@ -45,7 +45,7 @@ from go2_wbc.robot.profile import find_profile
 from motions import CompiledPlan, compile_timeline, load_motion
 
 FOOT_RADIUS, STAND_HEIGHT = find_profile().foot_radius, find_profile().stand_height
-FIRST_SEED = 9000
+FIRST_SEED = 9100
 """Seed of the first trial that is judged."""
 CALLS = 7
 HANGS = 90.0
