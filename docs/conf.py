@@ -43,7 +43,7 @@ nb_execution_mode = "off"  # the notebooks are committed with their outputs
 highlight_language = "none"
 
 # What needs ROS 2 or DDS is described by hand; its docstrings need neither.
-autodoc_mock_imports = ["rclpy", "cyclonedds"]
+autodoc_mock_imports = ["rclpy", "cyclonedds", "rerun"]
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
 autodoc_typehints_format = "short"
