@@ -105,7 +105,6 @@ EDITS = {
         "-95.3 0 0.836",
         "keyframe 'floor' has FL_calf_joint at -95.3 rad.* degrees",
     ),
-    "-1.66339 0 0.8361": ("-0.5 0 0.8361", "FL_calf_joint at -0.5 rad, outside -2.72"),
     '"FL_thigh" pos="0 0.0955 0"': (
         '"FL_thigh" pos="0 95.5 0"',
         "thigh's joint is 95.5.* m, not 0.09",
