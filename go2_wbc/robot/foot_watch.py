@@ -16,8 +16,10 @@ from go2_wbc.robot.state import PartFault, RobotState
 PULLED, LASTS, IMPULSE = 10.0, 0.024, 0.4
 """Force [N] that holds a foot, for how long [s], and what it adds up to [N s]: sound feet at the
 face of a step, among boxes and under pushes of 90 N s strike for 14 ms at most."""
-UNFELT = 10.0
-"""Force [N] below which a foot touches nothing: what stumbles is not held."""
+UNFELT, GRIP = 10.0, 2.0
+"""Force [N] below which a foot touches nothing: what stumbles is not held. By the latter times what
+it feels it must be held by more: a paw that was being unloaded, on a robot with much friction in
+its joints, was dragged towards its place by 13 N while the ground still pressed with 9."""
 UPRIGHT, CARRIED = 0.3, 0.5
 """Tilt [rad] from which on, and share of its weight on its feet below which, a robot tumbles: its
 legs strike each other. With a foot held, the others bear 0.65 at least."""
@@ -43,7 +45,7 @@ class FootWatch:
         """
         forces = state.foot_forces
         stands = state.tilt < UPRIGHT and forces.sum() > self._carried
-        is_held = (held > PULLED) & (forces < UNFELT) & stands
+        is_held = (held > PULLED + GRIP * forces) & (forces < UNFELT) & stands
         goes_on = is_held & (state.time - self._last < 1.5 * dt)
         self._last = state.time
         self._time = np.where(is_held, self._time * goes_on + dt, 0.0)

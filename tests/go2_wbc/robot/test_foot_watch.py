@@ -45,6 +45,7 @@ def test_a_held_foot_is_named_once() -> None:
         {"time": 0.9 * LASTS},
         {"gap": 8},
         {"others": 15.0},
+        {"held": 2.5 * PULLED, "force": 0.8 * UNFELT},
     ],
 )
 def test_a_foot_that_follows_stumbles_is_struck_or_tumbles_is_not_held(
