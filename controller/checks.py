@@ -23,8 +23,9 @@ ANGLE_TOLERANCE = 0.1
 """Angle [rad] from the asked attitude that still counts as there."""
 LYING_HEIGHT = 0.13
 """Height [m] of the base above the lowest foot below which the robot is down."""
-SETTLED = 0.01
-"""Height [m] of the base above where it goes limp below which the belly is down."""
+SETTLED = 0.015
+"""Height [m] of the base above where it goes limp below which the belly is down: that of a file
+with other hulls lies 1 cm higher."""
 LYING_TILT = 0.5
 """Angle [rad] from the vertical below which a robot lies on its belly."""
 LEANING = 0.4
