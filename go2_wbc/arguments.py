@@ -95,9 +95,11 @@ def _refusing(
 ) -> Callable[..., object]:
     @wraps(call)
     def checked(*args: object, **keywords: object) -> object:
-        if not late:
-            taken.require(*args, **keywords)
-            return call(*args, **keywords)
+        taken.require(*args, **keywords)
+        return call(*args, **keywords)
+
+    @wraps(call)
+    def checked_late(*args: object, **keywords: object) -> object:
         try:
             result = call(*args, **keywords)
         except Go2WbcError:
@@ -109,7 +111,7 @@ def _refusing(
             taken.require(*args, **keywords)
         return result
 
-    return checked
+    return checked_late if late else checked
 
 
 def _parts(kind: object) -> tuple[Any, tuple[Any, ...]]:

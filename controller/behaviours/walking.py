@@ -61,7 +61,7 @@ class Walking(Behaviour):
             if gait != self.gait:
                 self.change_gait(gait)
         reference = self._planner.update(snapshot, command, self.pose)
-        if self._planner.is_slowed and not self._has_told:
+        if not self._has_told and self._planner.is_slowed:
             self._has_told = True
             _log.warning("rough ground: %g m/s at most until it is smooth again", self._most)
         return reference

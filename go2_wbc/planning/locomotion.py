@@ -308,9 +308,11 @@ class LocomotionPlanner:
     @property
     def is_slowed(self) -> bool:
         """Whether rough ground keeps the robot slower than it is told."""
+        ground = self._state.ground
+        if ground.rough_way <= 0.0:
+            return False
         x, y = self._state.trunk.velocity[:2].tolist()
-        most = greatest_speed(self._state.ground, self._walk.config.rough)
-        return bool(np.hypot(x, y) > most - TIE)
+        return bool(np.hypot(x, y) > greatest_speed(ground, self._walk.config.rough) - TIE)
 
     @property
     def is_stepping(self) -> bool:
