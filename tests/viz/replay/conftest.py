@@ -1,4 +1,4 @@
-"""One browser for all tests that open pages."""
+"""One browser for each module of tests that open pages, and no two in a process."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 OpenPage = Callable[[Recording | ReplayContent], AbstractContextManager[Tab]]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def chromium_browser() -> Iterator[Browser]:
     with chromium() as browser:
         yield browser
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def open_page(chromium_browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> OpenPage:
     """Opens an exported page from its file, without a network."""
 
