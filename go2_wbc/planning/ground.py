@@ -77,6 +77,8 @@ steep: on stairs every other foot tells it anew, but on a ramp of 22 deg it is o
 and 3 of 10 robots fell behind it that still walked as on stairs."""
 FIRST_WAY = 0.5
 """For how far [m] the first step is taken for a high one."""
+HASTE_FRICTION = 0.4
+"""Friction from which on the ground bears the greatest acceleration."""
 ROUGH_HASTE = 1.0 / 3.0
 """Share of the accelerations that is left there."""
 CALMING = 0.8
@@ -237,7 +239,7 @@ def level_friction(g: Ground, friction: float, least: float) -> float:
 @subroutine
 def haste(g: Ground, friction: float) -> float:
     """Share of the greatest acceleration that the ground bears, by its ``friction`` and slope."""
-    share = level_friction(g, friction, LEAST_FRICTION) / MOST_FRICTION
+    share = min(level_friction(g, friction, LEAST_FRICTION) / HASTE_FRICTION, 1.0)
     return ROUGH_HASTE * share if is_rough(g) else share
 
 

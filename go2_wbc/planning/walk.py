@@ -64,7 +64,8 @@ class LocomotionConfig:
         compression: by which feet under the trunk's weight are pressed flat, or into the ground,
             [m]: in MuJoCo 1 to 6 mm, by the friction of the joints.
         linear_acceleration: greatest change of the commanded velocity [m/s^2] on a friction of
-            0.6, the most that is believed; on less it is as much less (``ground.haste``).
+            0.4 and more; on less it is as much less (``ground.haste``). By 3 and more robots that
+            turned round at 2 m/s fell on their own sensors.
         angular_acceleration: greatest change of the commanded turning rate [rad/s^2].
         velocity_feedback: foothold offset [s] per velocity error.
         stride_margin: speed [m/s] that the robot may have beyond the commanded one before the
@@ -90,7 +91,7 @@ class LocomotionConfig:
 
     height: float = 0.29
     compression: float = 0.004
-    linear_acceleration: float = 4.0
+    linear_acceleration: float = 2.5
     angular_acceleration: float = 4.0
     velocity_feedback: float = 0.12
     stride_margin: float = 0.4

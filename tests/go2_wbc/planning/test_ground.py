@@ -11,6 +11,7 @@ from go2_wbc.planning.ground import (
     DELAY,
     FRICTION_RISE,
     HALF_SPEED,
+    HASTE_FRICTION,
     LEAST_FRICTION,
     MOST_FRICTION,
     MOST_RAISE,
@@ -129,8 +130,8 @@ def test_the_robot_goes_slowly_on_rough_ground_and_for_a_way_after_it() -> None:
 def test_the_robot_speeds_up_as_the_ground_bears_it() -> None:
     level, slope = plane(on_plane(np.zeros(2))), plane(on_plane(SLOPE))
     assert haste(level, MOST_FRICTION) == 1.0
-    assert haste(level, 0.5 * MOST_FRICTION) == pytest.approx(0.5)
-    assert haste(slope, MOST_FRICTION) < 1.0
+    assert haste(level, 0.5 * HASTE_FRICTION) == pytest.approx(0.5)
+    assert haste(slope, HASTE_FRICTION) < 1.0
     level.rough_way = 0.1
     assert haste(level, MOST_FRICTION) == pytest.approx(ROUGH_HASTE)
 
