@@ -1,17 +1,21 @@
 """Every gait that has a name walks at the edge of its envelope, rests, and does what comes next."""
 
 from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from controller import GO2Controller
 from controller.behaviours.walking import Walking
-from controller.walker import CHANGE_SHARE
+from controller.walker import CHANGE_SHARE, Walker
+from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.envelopes import DWELL, envelope_of
 from go2_wbc.planning.gait_clock import time_between
+from go2_wbc.planning.ground import MOST_FRICTION
 from go2_wbc.planning.locomotion import LocomotionConfig
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
@@ -143,6 +147,23 @@ def test_a_change_of_gait_within_another_one_waits_for_both() -> None:
     )
     assert walking.asked(1.0 + both - 0.01).linear_x == 0.2
     assert walking.asked(1.0 + both + 0.01).linear_x == 1.0
+
+
+@pytest.mark.parametrize(("has_slid", "counted_on"), [(True, 0.15), (False, MOST_FRICTION)])
+def test_what_a_foot_has_shown_of_ice_is_kept_for_the_next_walk(
+    has_slid: bool, counted_on: float
+) -> None:
+    """What is only not known yet is not: a bound then counts on the ground."""
+    model, config = RobotModel(), Config()
+    snapshot = model.snapshot(MujocoPlant().read())
+    loop = SimpleNamespace(model=model)
+    runner: Any = SimpleNamespace(loop=loop, engage=lambda walking: walking.start(snapshot))
+    walker = Walker(runner, config)
+    walker.walking = Walking(model, GAITS["trot"], config.locomotion, 0.15, has_slid)
+    walker.start("bound")
+    walker.walking.update(snapshot)
+    assert walker.walking.friction == pytest.approx(counted_on, abs=0.01)
+    assert walker.walking.has_slid == has_slid
 
 
 @pytest.mark.slow
