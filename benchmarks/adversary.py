@@ -18,8 +18,7 @@ from benchmarks.adversary_motions import COUNT, FAMILIES, Numbers
 from benchmarks.command import Benchmark
 from benchmarks.study import Study, TrialResult
 from benchmarks.validation_set.physics import play
-from controller.motion_failures import failures_of, shares_of
-from controller.motion_measurement import MotionMeasurement
+from controller.motion_measurement import MotionMeasurement, failures_of, shares_of
 from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.errors import MotionError
 from go2_wbc.motion_plan import MotionPlan

@@ -32,7 +32,7 @@ from benchmarks.validation_set.questions import (
 )
 from benchmarks.validation_set.scores import HALVES, Case, render, scores, wrong_ones
 from controller.cli.common import ExitCode, Subparsers, add_parser
-from controller.motion_failures import FELL, LENIENT, STOPS, STRICT, MotionFailures, failures_of
+from controller.motion_measurement import FELL, LENIENT, STOPS, STRICT, MotionFailures, failures_of
 from controller.sweeps.trials import Trial
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker

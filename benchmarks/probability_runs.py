@@ -18,9 +18,8 @@ from benchmarks.validation_set.drawing import TEST, TRAIN
 from benchmarks.validation_set.physics import play, read_borders
 from benchmarks.validation_set.questions import IMPOSSIBLE, Question, questions
 from benchmarks.validation_set.random_timelines import RandomTimeline, random_timelines
-from controller.motion_failures import FELL, failures_of
-from controller.motion_measurement import measure_motion
-from controller.sweeps.rows import Row
+from controller.motion_measurement import FELL, failures_of, measure_motion
+from controller.sweeps.sweep_file import Row
 from controller.sweeps.trials import TrialFailed, TrialRobot
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.motion_plan import MotionPlan, Posture

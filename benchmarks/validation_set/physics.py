@@ -11,8 +11,7 @@ from pathlib import Path
 
 from benchmarks.study import Study, TrialResult
 from benchmarks.validation_set.questions import Question, draws
-from controller.motion_failures import failures_of
-from controller.motion_measurement import MotionMeasurement, measure_motion
+from controller.motion_measurement import MotionMeasurement, failures_of, measure_motion
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import write_atomically

@@ -13,7 +13,7 @@ from scipy.stats import binomtest
 
 from benchmarks.validation_set.drawing import TEST, TRAIN
 from benchmarks.validation_set.questions import STRATA
-from controller.motion_failures import (
+from controller.motion_measurement import (
     FELL,
     LENIENT,
     NOT_DONE,
@@ -116,7 +116,7 @@ class Score(NamedTuple):
 
     @staticmethod
     def of(cases: Iterable[Case], definition: str = STRICT) -> Score:
-        """The score on ``cases`` by a definition of ``controller.motion_failures``."""
+        """The score on ``cases`` by a definition of ``controller.motion_measurement``."""
         pairs = [(bool(case.refusal), bool(case.outcome.by(definition))) for case in cases]
         both, neither = pairs.count((True, True)), pairs.count((False, False))
         refused, failed = sum(r for r, _ in pairs), sum(f for _, f in pairs)

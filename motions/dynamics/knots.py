@@ -21,7 +21,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rpy_from_rotation, yaw_rotation
 from motions.batch_kinematics import attitudes, configurations, foot_centres, turned_back
 from motions.dynamics.phases import GRAVITY, KNOT_PERIOD, FullState, Phase, PhaseProblem
-from motions.dynamics.plan_limits import PlanLimits
+from motions.dynamics.plan_audit import PlanLimits
 from motions.postures import standing_feet, standing_on
 
 LEAD = 0.2

@@ -18,16 +18,14 @@ from jaxtyping import Bool, Float
 
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
-from motions.dynamics.curves import centred, feet_at
-from motions.dynamics.dynamic_trajectory import BALANCING_FEET
+from motions.dynamics.dynamic_trajectory import BALANCING_FEET, centred, feet_at
 from motions.dynamics.knots import true_spans
 from motions.dynamics.plan_audit import defects, drift
 from motions.feasibility.case import FEET, JOINTS, Case, Forces
 from motions.feasibility.forces import PRESSED
 from motions.feasibility.goal_errors import Misses, misses_of
 from motions.feasibility.report import Series
-from motions.plan.compiled_plan import LEAST_FEET, CompiledPlan
-from motions.plan.dynamic_span import DynamicSpan
+from motions.plan.compiled_plan import LEAST_FEET, CompiledPlan, DynamicSpan
 from motions.plan.trajectory import Trajectory
 
 _ROWS = (*(f"trunk {axis}" for axis in ("x", "y", "z", "roll", "pitch", "yaw")), *JOINTS)

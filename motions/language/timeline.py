@@ -29,11 +29,11 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from motions.language.arrangement import Arrangement
 from motions.language.body_and_feet import BodyAndFeet
-from motions.language.clock import SAME
 from motions.language.dynamic_blocks import DynamicBlocks
 from motions.language.footing import Footing
 from motions.language.keys import PhaseKey, StepKey
 from motions.language.steps import Steps
+from motions.language.timeline_data import SAME
 from motions.postures import standing_feet
 
 

@@ -28,8 +28,7 @@ from motions.batch_kinematics import (
     rates,
 )
 from motions.dynamics.projection import PlanTarget
-from motions.plan.compiled_plan import CompiledPlan, PlanSamples
-from motions.plan.dynamic_span import DynamicSpan
+from motions.plan.compiled_plan import CompiledPlan, DynamicSpan, PlanSamples
 from motions.plan.tracks import sample_times
 from motions.postures import standing_feet
 

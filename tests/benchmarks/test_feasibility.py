@@ -24,7 +24,7 @@ from benchmarks.validation_set.questions import draw_name, draws
 from benchmarks.validation_set.scores import Case
 from controller.cli.common import ExitCode
 from controller.go2_controller import GO2Controller
-from controller.motion_failures import STRICT, MotionFailures
+from controller.motion_measurement import STRICT, MotionFailures
 from controller.sweeps.trials import Trial
 from go2_wbc.robot.model import RobotModel
 

@@ -7,15 +7,14 @@ import pytest
 
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
-from controller.motion_failures import FELL, failures_of
-from controller.motion_measurement import SETTLED_CONTACT, _slip, measure_motion
+from controller.motion_measurement import FELL, SETTLED_CONTACT, _slip, failures_of, measure_motion
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline, deg
-from tests.controller.test_written_motion import PERIOD, touchdown
+from tests.controller.test_motion_measurement_written import PERIOD, touchdown
 from tests.go2_wbc.plant.helpers import empty_recording
 
 SKID = 0.5  # m/s

@@ -17,8 +17,7 @@ from benchmarks.validation_set.physics import (
     write_borders,
 )
 from benchmarks.validation_set.questions import FAMILIES, Question, draw_name, draws, questions
-from controller.motion_failures import UNPLANNED, MotionFailures, failures_of
-from controller.motion_measurement import MotionMeasurement
+from controller.motion_measurement import UNPLANNED, MotionFailures, MotionMeasurement, failures_of
 from go2_wbc.errors import ConfigError
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.robot.model import RobotModel

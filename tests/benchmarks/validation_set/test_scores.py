@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.validation_set.drawing import TEST, TRAIN
 from benchmarks.validation_set.scores import Case, Score, Share, render, scores, wrong_ones
-from controller.motion_failures import FELL, LENIENT, NOT_DONE, STRICT, UNPLANNED, MotionFailures
+from controller.motion_measurement import FELL, LENIENT, NOT_DONE, STRICT, UNPLANNED, MotionFailures
 
 
 def case(refused: bool, failed: bool, *, half: str = TEST, why: str = "slip 12 mm") -> Case:

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from controller.cli import demo_table
+from controller.cli.demo import render
 from controller.cli.progress import ProgressLine, progress_bar
 from controller.demo import DemoReport, DemoTotals, Measurement, StepResult, run_demo
 from tests.controller.fake_go2 import FakeGo2
@@ -27,13 +27,13 @@ def test_the_table_fits_80_columns_whatever_happens() -> None:
     bad = StepResult("stand", "forward 0.2 m/s, 2 s", False, LONG_REASON, 0.0, 123.45, (figure,))
     for report in (report_of(bad), run_demo(FakeGo2())):
         for encoding in ("utf-8", "ascii"):
-            lines = demo_table.render(report, encoding).splitlines()
+            lines = render(report, encoding).splitlines()
             assert max(map(len, lines)) <= COLUMNS
 
 
 def test_the_table_marks_every_step_and_gives_the_reason_of_a_failure() -> None:
     report = run_demo(FakeGo2(refusals={"high_five": "the paw was not held at 0.62 m"}))
-    text = demo_table.render(report, "utf-8")
+    text = render(report, "utf-8")
     assert text.count("✓") == 7
     assert text.count("✗") == 1
     assert "\n     the paw was not held at 0.62 m\n" in text
@@ -41,13 +41,13 @@ def test_the_table_marks_every_step_and_gives_the_reason_of_a_failure() -> None:
 
 
 def test_asked_and_measured_stand_side_by_side_with_their_unit() -> None:
-    text = demo_table.render(run_demo(FakeGo2(speed_share=0.95)), "utf-8")
+    text = render(run_demo(FakeGo2(speed_share=0.95)), "utf-8")
     row = next(line for line in text.splitlines() if "mean speed" in line)
     assert row.split()[-3:] == ["0.200", "0.190", "m/s"]
 
 
 def test_what_could_not_be_measured_is_a_dash() -> None:
-    text = demo_table.render(report_of(), "utf-8")
+    text = render(report_of(), "utf-8")
     assert "nan" not in text
     assert "least support margin   -" in text
 
@@ -55,9 +55,7 @@ def test_what_could_not_be_measured_is_a_dash() -> None:
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", None, "no-such-encoding"])
 def test_a_terminal_without_ticks_gets_words(encoding: str | None) -> None:
     good = StepResult("sit", "sit", True, "done", 0.0, 1.0)
-    text = demo_table.render(
-        report_of(good, StepResult("s", "s", False, "why", 0.0, 1.0)), encoding
-    )
+    text = render(report_of(good, StepResult("s", "s", False, "why", 0.0, 1.0)), encoding)
     assert "  ok sit" in text
     assert "FAIL s" in text
     assert text.isascii()

@@ -12,7 +12,7 @@ from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from motions.dynamics import DynamicTrajectory, PhaseProblem, Tolerance, phase_builders, solve
-from motions.dynamics.plan_limits import PlanLimits
+from motions.dynamics.plan_audit import PlanLimits
 from motions.postures import standing_feet
 from tests.motions.dynamics.conftest import PROBLEMS
 

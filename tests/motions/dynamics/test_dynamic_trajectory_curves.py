@@ -5,7 +5,7 @@ import pytest
 
 from go2_wbc.robot.model import RobotModel
 from motions.dynamics import DynamicTrajectory, pieces
-from motions.dynamics.curves import COM, FEET, JOINTS, centred
+from motions.dynamics.dynamic_trajectory import COM, FEET, JOINTS, centred
 
 JOINT_JERK = 15.0  # rad/s^2; knots of 19.6 to 20 ms beside each other shift rates by that
 COM_ACCELERATION = 2.5  # m/s^2 of up to 40: the CoM of the middle of a knot is not that of its end

@@ -9,12 +9,10 @@ import pytest
 from controller import sweep
 from controller.cli.common import ExitCode
 from controller.sweeps.motion_study import MotionStudy, archive_of, replay
-from controller.sweeps.rows import Row, row_of
 from controller.sweeps.run import SweepResult
-from controller.sweeps.studies import GaitStudy, PushStudy
-from controller.sweeps.sweep_file import SweepFile
+from controller.sweeps.sweep_file import Row, SweepFile, row_of
 from controller.sweeps.targets import target_of
-from controller.sweeps.trials import TrialRobot
+from controller.sweeps.trials import GaitStudy, PushStudy, TrialRobot
 from go2_wbc import World
 from go2_wbc.errors import CommandError
 from go2_wbc.planning.command import VelocityCommand

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from jaxtyping import Float
 
-from controller.behaviours.anchoring import APPROACH, FARTHEST, Approach, anchor_of
+from controller.behaviours.plans import APPROACH, FARTHEST, Approach, anchor_of
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.reference import Anchor, Target

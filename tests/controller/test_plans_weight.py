@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from controller import GO2Controller
-from controller.behaviours.weight import LEAST, FeltWeight, vertical_force
+from controller.behaviours.plans import LEAST_WEIGHT, FeltWeight, vertical_force
 from go2_wbc.legs import Leg
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.reference import LegTask, Target
@@ -101,7 +101,7 @@ def test_feet_that_carry_nothing_do_not_make_the_robot_weightless(model: RobotMo
     weight = FeltWeight(NO_FRICTION)
     for _ in range(200):
         weight.add_to(planned(), snapshot, DT)
-    assert weight.ratio == LEAST
+    assert weight.ratio == LEAST_WEIGHT
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controller.written_motion import LANDED, off_written, placed, trunk_off, turned_off
+from controller.motion_measurement import LANDED, off_written, placed, trunk_off, turned_off
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording

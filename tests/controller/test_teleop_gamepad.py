@@ -6,18 +6,21 @@ from types import SimpleNamespace
 import pytest
 
 from controller import GO2Controller
-from controller.gamepad import (
+from controller.modes import Mode
+from controller.teleop import (
+    ACTIONS,
     AHEAD,
     ASIDE,
     BUTTONS,
+    DAMP,
     DEAD_ZONE,
     LEGEND,
+    STOP,
     TURNING,
     PadReading,
+    Teleop,
     find_gamepad,
 )
-from controller.modes import Mode
-from controller.teleop import ACTIONS, DAMP, STOP, Teleop
 from go2_wbc.errors import ModeError
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from tests.controller.fake_go2 import FakeGo2

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from controller.sweeps.rows import columns_of, joined, row_of
+from controller.sweeps.sweep_file import columns_of, joined, row_of
 from go2_wbc.errors import SweepError
 
 

@@ -7,7 +7,7 @@ from go2_wbc.errors import PlanNotFound
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline
 from motions.language.keys import BalanceShift
-from motions.plan.repair import LEAD, pieces_to_repair, without_vain_shifts
+from motions.plan.timeline_compiler import LEAD, pieces_to_repair, without_vain_shifts
 from motions.plan.trajectory import Trajectory, trajectory_of
 
 LINE = (
