@@ -16,7 +16,8 @@ from controller.go2_controller import GO2Controller
 from controller.modes import Mode
 from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import MotionPlan
-from go2_wbc.plant.mujoco.ground_truth import TOUCH, GroundTruth, TruthRecording, true_runs
+from go2_wbc.plant.mujoco.ground_truth import TOUCH, GroundTruth, TruthRecording
+from go2_wbc.recording import true_runs
 from go2_wbc.records import layout_of
 from go2_wbc.reference import STANCE, Anchor, LegTask, Target
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places

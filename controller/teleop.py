@@ -14,8 +14,8 @@ from queue import SimpleQueue
 from typing import Any, final
 
 from controller.go2_controller import GO2Controller
-from controller.jobs import Answer, Job, JobServer
-from controller.modes import Aborted, Measurements, Mode
+from controller.jobs import Job, JobServer
+from controller.modes import Aborted, Measurements, Mode, Outcome
 from go2_wbc.errors import ClosedError, Go2WbcError
 from go2_wbc.extras import install_line
 from go2_wbc.planning.command import VelocityCommand
@@ -247,7 +247,7 @@ class Teleop:
                 raise Aborted(self._go2.last_outcome.reason)
             return {}
 
-        def tell(answer: Answer) -> None:
+        def tell(answer: Outcome) -> None:
             if not isinstance(answer.error, ClosedError):
                 self._news.put(f"{label}: {'done' if answer.ok else answer.reason}")
             self._doing = ""

@@ -235,7 +235,7 @@ class PlayPlan(Behaviour):
         return float(np.linalg.norm(off)), abs(wrap_angle(stands.yaw - wanted.yaw))
 
     @property
-    def sag_and_lean(self) -> tuple[float, float]:
+    def sag_and_lean(self) -> tuple[float, float] | None:  # type: ignore[override]
         """From the plan: a correction that pulls against a load is no wanted lean."""
         return self._tracker.sag_and_lean
 

@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 
-from go2_wbc.brief import brief, cut, inline_html
+from go2_wbc.brief import brief, counted, cut, inline_html
 from go2_wbc.errors import MotionInfeasible
 from go2_wbc.world import World
 from motions.feasibility.goal_errors import Departure
@@ -354,8 +354,10 @@ class FeasibilityReport:
                 lines.append(f"{line} {mark:<2} {finding.unit}".rstrip())
             else:
                 lines.append(f"{line}{'-':>10}{'-':>9}{'-':>10} {mark}")
-        verdict = "can do it" if self.ok else f"cannot do it: {_count(len(self.failures), 'limit')}"
-        tight = f", {_count(len(self.warnings), 'tight margin')}" if self.warnings else ""
+        verdict = (
+            "can do it" if self.ok else f"cannot do it: {counted(len(self.failures), 'limit')}"
+        )
+        tight = f", {counted(len(self.warnings), 'tight margin')}" if self.warnings else ""
         lines += ["-" * 80, f"{self.motion}, {self.duration:.1f} s: the robot {verdict}{tight}."]
         if self.world != World():
             lines += wrap(f"That holds for {self.world}.", 80)
@@ -373,7 +375,7 @@ class FeasibilityReport:
         """One line: the verdict, and what to mend first, or what is closest to its limit."""
         if not self.ok:
             first, *more = self.failures
-            rest = f"; {_count(len(more), 'more limit')}" if more else ""
+            rest = f"; {counted(len(more), 'more limit')}" if more else ""
             return f"no   {self.motion:<15} {first}{rest}"
         tight = min(self.margins.values(), key=lambda f: f.margin / max(abs(f.limit), 1e-9))
         return (
@@ -395,10 +397,6 @@ class FeasibilityReport:
             "departures": [asdict(one) for one in self.departures],
             "margins": {check: asdict(finding) for check, finding in self.margins.items()},
         }
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def _percent(chance: float) -> str:

@@ -54,7 +54,7 @@ class Timeline(BodyAndFeet, Steps, DynamicBlocks, Arrangement):
             feet = Footing(self._between(start, block.start), nominal, feet).end
             heading = yaw_rotation(Anchor.of_feet(feet, 0.0).yaw)
             feet, start = feet + block.shift @ heading.T, block.end
-        return Footing(self._between(start, math.inf), nominal, feet).end_pose
+        return Anchor.of_feet(Footing(self._between(start, math.inf), nominal, feet).end, 0.0).pose
 
     def reverse(self) -> Timeline:
         """The same motion backwards; it must end at home, with its feet below their hips.

@@ -349,9 +349,7 @@ class CompiledPlan(MotionPlan):
     @property
     def end_pose(self) -> tuple[float, float, float]:
         """Where it ends: x, y [m] and yaw [rad] of the frame of the feet, in that of the motion."""
-        anchor = Anchor.of_feet(self.curves(self.duration)[18:].reshape(4, 3), 0.0)
-        x, y, _ = anchor.p_world.tolist()
-        return x, y, anchor.yaw
+        return Anchor.of_feet(self.curves(self.duration)[18:].reshape(4, 3), 0.0).pose
 
     @property
     def held_feet(self) -> tuple[HeldFoot, ...]:

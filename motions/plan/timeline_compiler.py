@@ -22,11 +22,12 @@ from go2_wbc.contacts import ContactSchedule
 from go2_wbc.curves import Ease
 from go2_wbc.errors import PlanNotFound, TimelineError
 from go2_wbc.motion_plan import Posture
+from go2_wbc.recording import true_runs
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from motions.dynamics.dynamic_trajectory import DynamicTrajectory
-from motions.dynamics.knots import standing, true_spans
+from motions.dynamics.knots import standing
 from motions.dynamics.phases import PhaseProblem, Progress
 from motions.dynamics.plan_cache import nearest_cached, solve_cached
 from motions.dynamics.projection import PlanTarget
@@ -143,13 +144,15 @@ def _rests(
     moves = np.maximum([0.0, *steps], [*steps, 0.0])
     at_home = np.abs(path.q[:, 7:] - path.q[0, 7:]).max(axis=1) < SAME_POSE
     rests = []
-    for first, last in true_spans((steps < SAME_POSE * np.diff(path.times)) & is_ready[1:]):
+    for rest in true_runs((steps < SAME_POSE * np.diff(path.times)) & is_ready[1:]):
+        first, last = rest.start, rest.stop
         if path.times[last] - path.times[first] > LEAST_REST - SAME_POSE:
             rests.append((first, last))
             at_home[max(first - NEAR, 0) : last + NEAR] = False
-    for first, end in true_spans(at_home & is_ready & (moves < SLOW)):
-        slowest = first + int(np.argmin(moves[first:end]))
-        rests += [(slowest, slowest)] if first > 0 and end < len(moves) else []
+    for instants in true_runs(at_home & is_ready & (moves < SLOW)):
+        slowest = instants.start + int(np.argmin(moves[instants]))
+        is_inside = instants.start > 0 and instants.stop < len(moves)
+        rests += [(slowest, slowest)] if is_inside else []
     return sorted((a, b) for a, b in rests if not ((broken > a) & (broken < b)).any())
 
 

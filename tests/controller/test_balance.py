@@ -12,7 +12,7 @@ from controller.behaviours.standing import (
     must_step,
     trot_against,
 )
-from controller.checks import is_standing
+from controller.modes import is_standing
 from go2_wbc.contacts import GAITS
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel

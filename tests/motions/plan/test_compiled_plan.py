@@ -37,6 +37,14 @@ def test_samples_are_the_references(name: str) -> None:
         assert difference.max() <= scale * ROUNDING, field.name
 
 
+def test_a_held_foot_is_as_high_as_it_is_in_the_middle_of_its_hold() -> None:
+    plan = library_plan("high_five")
+    (held,) = plan.held_feet
+    middle = 0.5 * (held.start + held.end)
+    assert held.height == pytest.approx(plan.at(middle).p_world_feet[held.leg, 2], abs=ROUNDING)
+    assert held.height > 0.05
+
+
 @pytest.mark.parametrize("name", ["high_five", "dance", "wave", "sit_pretty", "jump_up"])
 def test_a_reference_says_what_curves_and_contacts_say(name: str) -> None:
     plan, rng = library_plan(name), np.random.default_rng(3)

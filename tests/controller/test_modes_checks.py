@@ -6,13 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controller.checks import (
+from controller.modes import (
+    Limited,
+    are_within,
     lying,
     posture_measurements,
     sitting,
     standing,
+    told,
 )
-from controller.modes import Limited, are_within, told
 from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
