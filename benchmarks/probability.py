@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.command import add_sweep, positive, publish, run_sweep
+from benchmarks.figures import reliability_figure
 from benchmarks.probability_fit import Calibration, Sample, calibration, fit
 from benchmarks.probability_runs import DRAWN, motion_and_world, seeds, trial
 from benchmarks.validation_set.drawing import TEST, TRAIN
@@ -24,7 +25,6 @@ from controller.sweeps.summary import rate_interval
 from controller.sweeps.sweep_file import Row
 from go2_wbc.files import checked_output, write_atomically
 from motions.feasibility.report import FILE, ProbabilityModel, fitted
-from viz.render.study_plots import reliability_figure
 from viz.style import PLOT_SUFFIXES, save_figure
 
 FITTED = (TRAIN, DRAWN)  # What the model may be fitted to

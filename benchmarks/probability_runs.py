@@ -47,7 +47,7 @@ def trial(seed: int) -> dict[str, object]:
     if seed >= len(runs()):  # a sentence
         sentence, checker = drawn()[seed - len(runs())], FeasibilityChecker(model())
         plan = checker.plan(sentence.line, check=False)
-        harm = failures_of(play(plan, model(), sentence.number), plan).strict
+        harm = failures_of(play(plan, model(), sentence.number), plan)
         kind = (f"sentence {sentence.number}", DRAWN, DRAWN)
         return _row(sentence.name, kind, checker.world, checker.check(plan), harm)
     question, plan = _asked(runs()[seed])
@@ -107,7 +107,7 @@ def played(plan: MotionPlan, world: World, seed: int) -> tuple[str, ...]:
         except (TrialFailed, Go2WbcError):
             return (NOT_READY,)
         measured = measure_motion(robot.go2, robot.truth, plan, model())
-    return failures_of(measured, plan).strict
+    return failures_of(measured, plan)
 
 
 @lru_cache(maxsize=1)

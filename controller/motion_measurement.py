@@ -309,10 +309,9 @@ def _off_plan(
     return float(trunk_off(asked, truth).max()), float(turned_off(asked, truth).max()), feet
 
 
-STRICT, STOPS, LENIENT, FELL = "strict", "stops", "lenient", "fell"
-UNPLANNED, NOT_DONE = "no plan was found", "not done"
+UNPLANNED, NOT_DONE, FELL = "no plan was found", "not done", "fell"
 OFF_TRUNK, OFF_TURN, OFF_PAW, OFF_LANDING = 0.030, math.radians(8.0), 0.030, 0.015
-"""How far [m, rad] trunk, raised feet and landed feet may be off what was written, strictly."""
+"""How far [m, rad] trunk, raised feet and landed feet may be off what was written."""
 SOLVED_OFF, SOLVED_LANDING = 0.050, 0.040
 """The same where a part is solved: the tolerance that a timeline gives by itself, and how near its
 place a jump must land."""
@@ -321,53 +320,31 @@ SLIP = 0.010
 MOMENT = 0.010
 """Time [s] for which motors may be saturated, joints on a stop, and what must not touch touch."""
 BEYOND = 0.02
-"""Angle [rad] by which a joint may be past its limit, strictly."""
-LENIENT_OFF = 0.05
-"""Distance [m] that anything may be off what was written, leniently."""
+"""Angle [rad] by which a joint may be past its limit."""
 
 
-@dataclass(frozen=True, slots=True)
-class MotionFailures:
-    """What went wrong, in words, by each definition; nothing did where it is empty.
-
-    Attributes:
-        strict: what an author sees: not done, or not as it was written.
-        stops: the same, or a joint was pressed against its stop: MuJoCo's hold a joint within
-            0.02 rad of its limit, so a motion that asks for more often looks done.
-        lenient: distances from the plan, with more room, whatever ``play`` says.
-        fell: nothing else.
-    """
-
-    strict: tuple[str, ...]
-    stops: tuple[str, ...]
-    lenient: tuple[str, ...]
-    fell: tuple[str, ...]
-
-    def by(self, definition: str) -> tuple[str, ...]:
-        """What went wrong by ``STRICT``, ``STOPS``, ``LENIENT`` or ``FELL``."""
-        found: tuple[str, ...] = getattr(self, definition)
+def failures_of(run: MotionMeasurement, plan: MotionPlan) -> tuple[str, ...]:
+    """What went wrong, in words, as an author sees it: not done, or not as it was written."""
+    unplanned = any(problem.check == "dynamic plan" for problem in getattr(plan, "problems", ()))
+    wrong = {
+        UNPLANNED: unplanned,
+        FELL: run.fall is not None,
+        NOT_DONE: not (run.said or unplanned),
+    }
+    found = tuple(what for what, is_so in wrong.items() if is_so)
+    if unplanned:
         return found
-
-
-def failures_of(run: MotionMeasurement, plan: MotionPlan) -> MotionFailures:
-    """Judge what was measured by all definitions."""
-    fell = _true({"fell": run.fall is not None})
-    if any(problem.check == "dynamic plan" for problem in getattr(plan, "problems", ())):
-        unplanned = (UNPLANNED, *fell)
-        return MotionFailures(unplanned, unplanned, unplanned, fell)
-    strict = _strictly(run, plan)
-    pressed = _true({f"on a stop {1e3 * run.stopped:.0f} ms": run.stopped > MOMENT})
-    return MotionFailures(strict, (*strict, *pressed), _leniently(run, plan), fell)
+    return (*found, *(words for share, words in shares_of(run, plan).values() if share > 1.0))
 
 
 def shares_of(run: MotionMeasurement, plan: MotionPlan) -> dict[str, tuple[float, str]]:
-    """What the strict definition looks at, by name: its share of what is allowed, and in words.
+    """What ``failures_of`` looks at, by name: its share of what is allowed, and in words.
 
     A share above 1 is wrong.
     """
     is_solved = isinstance(plan, CompiledPlan) and bool(plan.dynamic)
     off, landing = (SOLVED_OFF, SOLVED_LANDING) if is_solved else (OFF_TRUNK, OFF_LANDING)
-    paw, landed = max(run.paw_off, _short(plan)), run.landed_off
+    paw, landed = max(run.paw_off, short_legs(plan)), run.landed_off
     beyond = -run.joint_distance
     return {
         "slip": (run.slip / SLIP, f"slip {1e3 * run.slip:.0f} mm"),
@@ -384,31 +361,7 @@ def shares_of(run: MotionMeasurement, plan: MotionPlan) -> dict[str, tuple[float
     }
 
 
-def _strictly(run: MotionMeasurement, plan: MotionPlan) -> tuple[str, ...]:
-    ends = _true({"fell": run.fall is not None, NOT_DONE: not run.said})
-    return (*ends, *(words for share, words in shares_of(run, plan).values() if share > 1.0))
-
-
-def _leniently(run: MotionMeasurement, plan: MotionPlan) -> tuple[str, ...]:
-    off = max(run.tracking, run.ends_off, run.feet_off, _short(plan) - run.feet_off)
-    return _true(
-        {
-            "fell": run.fall is not None,
-            f"slip {1e3 * run.slip:.0f} mm": run.slip > SLIP,
-            f"{1e3 * off:.0f} mm off": off > LENIENT_OFF,
-            f"touch {1e3 * run.touched:.0f} ms": run.touched > MOMENT,
-            f"saturated {1e3 * run.saturated:.0f} ms": run.saturated > MOMENT,
-            f"joint {-run.joint_distance:.3f} rad past": run.joint_distance < 0.0,
-            f"joint at {100.0 * run.speed:.0f} % speed": run.speed > 1.0,
-        }
-    )
-
-
-def _short(plan: MotionPlan) -> float:
+def short_legs(plan: MotionPlan) -> float:
     """Largest distance [m] by which a leg is too short for what was written."""
     misses = [problem.miss for problem in getattr(plan, "problems", ())]
     return max((miss for miss in misses if miss > 0.0), default=0.0)
-
-
-def _true(found: dict[str, bool]) -> tuple[str, ...]:
-    return tuple(what for what, is_so in found.items() if is_so)

@@ -53,7 +53,7 @@ class MotionStudy:
     def __call__(self, seed: int) -> Row:
         """Whether it was done, what went wrong, and what was measured.
 
-        See ``failures_of`` (strict) and ``MotionMeasurement``; lengths in m, times in s.
+        See ``failures_of`` and ``MotionMeasurement``; lengths in m, times in s.
         """
         world, plant = self.drawn(seed)
         with TrialRobot(plant) as robot:
@@ -66,7 +66,7 @@ class MotionStudy:
         except (TrialFailed, Go2WbcError) as error:
             measured = replace(_NOTHING, fall=str(error))
         plan = plan_of(self.archive)
-        harm, shares = failures_of(measured, plan).strict, shares_of(measured, plan)
+        harm, shares = failures_of(measured, plan), shares_of(measured, plan)
         closest, (share, _) = max(shares.items(), key=lambda item: np.nan_to_num(item[1][0]))
         values = {**measured.as_dict(), "fall": measured.fall or ""}
         row: Row = {"done": not harm, "harm": "; ".join(harm)}
