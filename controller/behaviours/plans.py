@@ -24,8 +24,7 @@ from go2_wbc.robot.motor import JointFriction
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.tracking.landing import Landings
-from go2_wbc.tracking.plan_feedback import fed_back
-from go2_wbc.tracking.plan_tracking import Deviation, PlanTracker, tracked_position
+from go2_wbc.tracking.plan_tracking import Deviation, PlanTracker, fed_back, tracked_position
 from motions.dynamics.phases import GRAVITY
 
 LEAST_WEIGHT, MOST_WEIGHT = 0.8, 1.4

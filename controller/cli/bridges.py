@@ -121,7 +121,7 @@ def unitree_drive(
     """
     from controller.arguments import config as read_config
     from controller.bridges.unitree.drive import Trot, check_steps, drive
-    from controller.bridges.unitree.guards import GuardConfig
+    from controller.bridges.unitree.low_level import GuardConfig
     from controller.bridges.unitree.plant import UnitreePlant
 
     check_steps([*steps])

@@ -31,8 +31,8 @@ from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.files import checked_output, write_atomically
 
 if TYPE_CHECKING:
-    from controller.demo.report import DemoReport, DemoTotals, Measurement, StepResult
     from controller.demo.run import DemoProgress
+    from controller.demo.steps import DemoReport, DemoTotals, Measurement, StepResult
     from controller.go2_controller import GO2Controller
     from go2_wbc.recording import Recording
 
@@ -144,8 +144,7 @@ def _run_over_ros(namespace: str, *, as_json: bool) -> int:
     """Run the demo on a robot that another process serves, print the steps."""
     from controller.bridges.ros2.demo import run_ros_demo
     from controller.cli.progress import ProgressLine
-    from controller.demo.report import DemoReport
-    from controller.demo.steps import DEMO_STEPS
+    from controller.demo.steps import DEMO_STEPS, DemoReport
 
     number = count(1)
     with ProgressLine() as line:

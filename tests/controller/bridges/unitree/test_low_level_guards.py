@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from controller.behaviours.joints import DAMPING
-from controller.bridges.unitree.guards import GuardConfig, Guards, is_passive, require_sane
+from controller.bridges.unitree.low_level import GuardConfig, Guards, is_passive, require_sane
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.profile import find_profile
