@@ -35,7 +35,7 @@ from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.trunk import LEVEL, BodyPose
 from go2_wbc.plant import Plant
-from motions.postures import lie_down, rise, sit_down
+from motions.postures import lie_down, rise, sit_down, sit_raise
 
 READY_TIME = 0.2
 """Time [s] that a robot is given to stand ready in walking mode."""
@@ -134,7 +134,10 @@ class Pilot:
         """Sit like a dog, from any mode but fallen."""
         if self.mode is not Mode.SITTING:
             self._ensure_standing()
-            self._take_posture(ChangePosture(partial(sit_down, profile=self._loop.model.profile)))
+            model = self._loop.model
+            raised = sit_raise(self._loop.snapshot.p_world_feet, model)
+            sit = partial(sit_down, profile=model.profile, raised=raised)
+            self._take_posture(ChangePosture(sit))
         return self._settle(Posture.SIT, "sit")
 
     def lie_down(self) -> Measurements:
