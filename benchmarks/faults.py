@@ -31,7 +31,8 @@ from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant.faults import AXES
-from go2_wbc.plant.mujoco.ground_truth import FALLEN_TILT, TOUCH, true_runs
+from go2_wbc.plant.mujoco.ground_truth import FALLEN_TILT, TOUCH
+from go2_wbc.recording import true_runs
 from go2_wbc.robot.profile import GO2
 from motions import load_motion
 

@@ -14,16 +14,20 @@ from functools import partial
 from controller.acceptance import Acceptance
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.standing import Standing
-from controller.checks import (
+from controller.modes import (
     LYING_HEIGHT,
+    Aborted,
+    Measurements,
+    Mode,
     base_height,
     is_standing,
+    listed,
     lying,
     sitting,
     standing,
+    told,
     why_not_standing,
 )
-from controller.modes import Aborted, Measurements, Mode, listed, told
 from controller.navigation import Goal
 from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner

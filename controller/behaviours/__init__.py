@@ -28,11 +28,7 @@ class Behaviour(ABC):
     may_lie: bool = False
     is_dynamic: bool = False
     knows_payload: bool = False
-
-    @property
-    def sag_and_lean(self) -> tuple[float, float] | None:
-        """See the attributes."""
-        return None
+    sag_and_lean: tuple[float, float] | None = None
 
     def start(self, snapshot: Snapshot) -> None:
         """Begin from the measured state."""

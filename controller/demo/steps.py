@@ -9,10 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from controller.checks import ANGLE_TOLERANCE, HEIGHT_TOLERANCE, STILL_SPEED
 from controller.demo.report import Measurement
 from controller.go2_controller import GO2Controller
-from controller.modes import Outcome
+from controller.modes import ANGLE_TOLERANCE, HEIGHT_TOLERANCE, STILL_SPEED, Outcome
 from controller.navigation import HEADING_TOLERANCE
 from go2_wbc.recording import Recording
 from go2_wbc.robot.profile import find_profile
