@@ -11,6 +11,7 @@ from go2_wbc.contacts import Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.envelopes import DWELL, GaitChoice
 from go2_wbc.planning.gait_clock import time_between
+from go2_wbc.planning.height_map import HeightMap
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.planning.trunk import LEVEL, SETTLED_COMMAND, BodyPose
 from go2_wbc.reference import Reference
@@ -36,15 +37,16 @@ class Walking(Behaviour):
         config: LocomotionConfig,
         friction: float | None = None,
         has_slid: bool = True,
+        heights: HeightMap | None = None,
     ) -> None:
-        """Walk with ``gait``, on ground of which that is known; see ``LocomotionPlanner.start``."""
+        """Walk with ``gait``, on ground of which that is known; see ``LocomotionPlanner``."""
         self.gait = gait
         self._known_friction, self._had_slid = friction, friction is not None and has_slid
         self.command: VelocityCommand = ZERO_COMMAND
         self.pose: BodyPose = LEVEL
         self.choice: GaitChoice | None = None
         self._limit, self._is_limited_until = VelocityEnvelope(), -np.inf
-        self._planner, self._most = LocomotionPlanner(model, gait, config), config.rough.speed
+        self._planner, self._most = LocomotionPlanner(model, gait, config, heights), config.rough.speed
         self._has_told = False
 
     def start(self, snapshot: Snapshot) -> None:

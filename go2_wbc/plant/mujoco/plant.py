@@ -16,10 +16,11 @@ from jaxtyping import Float
 from go2_wbc.arguments import typed
 from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, unknown_name
 from go2_wbc.legs import LEGS
-from go2_wbc.plant.base import Plant
+from go2_wbc.plant.base import Plant, Scan
 from go2_wbc.plant.faults import HELD_TIME, Faults, InjectedFault
 from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN, bin_forces, read_joints
+from go2_wbc.plant.mujoco.lidar import Lidar, LidarConfig
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
 from go2_wbc.plant.mujoco.pushes import Pushes
 from go2_wbc.plant.mujoco.settling import settle
@@ -73,6 +74,7 @@ class MujocoPlant(Plant):
         robot: name of its profile: "go2", "a1" or "go1".
         visuals: also load the visual meshes (slower), for the viewer and for rendering.
         delay: time [s] after which a command acts, rounded to whole control periods.
+        lidar: whether it has one, or its numbers; only without ``mjcf``.
 
     Raises:
         ClosedError: from all calls, once it is closed.
@@ -107,6 +109,7 @@ class MujocoPlant(Plant):
         visuals: bool = False,
         delay: float = 0.0,
         keyframe: str | None = None,
+        lidar: LidarConfig | bool = False,
     ) -> None:
         if sensors not in SENSORS:
             raise ConfigError(unknown_name("sensors", sensors, SENSORS))
@@ -157,6 +160,9 @@ class MujocoPlant(Plant):
         self._senses: Proprioception | None = None
         self._state: RobotState | None = None
         self._imu: ImuSample | None = None
+        self._lidar: Lidar | None = None
+        if lidar:
+            self._lidar = Lidar.on(lidar, setup, (self._model, self._data))
         self.write(resting)
         self._ticks, self._data.time = 0, 0.0
         if sensors == "imu":
@@ -261,6 +267,10 @@ class MujocoPlant(Plant):
             raised = [mujoco.mju_warningText(int(i), 0) for i in np.flatnonzero(self._warnings)]
             raise PlantError(f"physics failed at t={self.time:.3f} s: {'; '.join(raised)}")
         self._sense()
+
+    def scan(self) -> Scan | None:
+        """See ``Plant.scan``."""
+        return None if self._lidar is None else self._lidar.scan(self.time)
 
     def imu(self) -> ImuSample:
         """The inertial measurement unit's reading; its accelerometer lags by one physics step."""
