@@ -46,8 +46,12 @@ class Walking(Behaviour):
         self.pose: BodyPose = LEVEL
         self.choice: GaitChoice | None = None
         self._limit, self._is_limited_until = VelocityEnvelope(), -np.inf
-        self._planner, self._most = LocomotionPlanner(model, gait, config, heights), config.rough.speed
-        self._has_told = False
+        self._planner, self._most = (
+            LocomotionPlanner(model, gait, config, heights),
+            config.rough.speed,
+        )
+        self._heights = heights
+        self._has_told, self._told_block = False, ""
 
     def start(self, snapshot: Snapshot) -> None:
         """Start from the measured state, standing."""
@@ -66,6 +70,11 @@ class Walking(Behaviour):
         if not self._has_told and self._planner.is_slowed:
             self._has_told = True
             _log.warning("rough ground: %g m/s at most until it is smooth again", self._most)
+        if self._heights is not None and self._heights.is_used:
+            blocked = self.blocked
+            if blocked and not self._told_block:
+                _log.warning("stopped: %s", blocked)
+            self._told_block = blocked
         return reference
 
     def square_up(self, snapshot: Snapshot) -> bool:
@@ -112,10 +121,16 @@ class Walking(Behaviour):
 
         The robot itself may yet catch up.
         """
-        if self._planner.is_slowed:
+        if self._planner.is_slowed or self._planner.sight.is_slowed:
             return True
         command = self.command.linear_x, self.command.linear_y, self.command.angular_z
         return bool(np.allclose(self._planner.velocity, command, atol=SETTLED_COMMAND))
+
+    @property
+    def blocked(self) -> str:
+        """What stops the robot that is commanded to go on, in plain words; "" if nothing does."""
+        sight = self._planner.sight
+        return sight.why_blocked if sight.is_slowed else ""
 
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether the robot has come to rest."""

@@ -51,8 +51,8 @@ RATE, STOOD, STILL, ASTRAY = 1.0, 0.04, 0.15, 0.04
 """How fast feet move the map [1/s], how long [s] they must have stood, more slowly than [m/s], and
 how near to the map [m]."""
 FOOT_VARIANCE, COMPRESSION = 1e-4, 0.004
-"""Of what a foot writes [m^2]: 1 cm; and by how much [m] a foot that carries the robot is flatter than
-a round one. Without it feet and scans pull the map to and fro."""
+"""Of what a foot writes [m^2]: 1 cm; and by how much [m] a foot that carries the robot is flatter
+than a round one. Without it feet and scans pull the map to and fro."""
 
 
 class HeightMap(Record):
@@ -100,6 +100,14 @@ def heights_at(m: HeightMap, places: Float[np.ndarray, "n 2"], z: Float[np.ndarr
     """Fill the heights [m] at many places, nan where nothing is known."""
     for n in range(places.shape[0]):
         z[n] = height_at(m, places[n, 0], places[n, 1])
+
+
+def cells(m: HeightMap) -> Float[np.ndarray, "n 3"]:
+    """Middles of all cells that are known [m]."""
+    known = m.name[m.name != 0.0] - 0.5
+    i = np.round(known / _STRIDE)  # j may be negative
+    xy = CELL * (np.column_stack([i, known - i * _STRIDE]) + 0.5)
+    return np.column_stack([xy, m.height[m.name != 0.0] + m.shift])
 
 
 @subroutine

@@ -1,26 +1,28 @@
 """Where feet are put down, and how they get there, on ground that the robot has seen.
 
-A foothold is the cell near to where the foot would be put down blindly (``footholds``), at a distance
-d, that costs least:
+A foothold is the cell near to where the foot would be put down blindly (``footholds``), at a
+distance d, that costs least:
 
     (d / FAR)^2 + EDGE edge + (range / FLAT)^2 + UNKNOWN [not known] + STICKY [not the one before]
-        + MISS sum of how far, at touchdown, in the middle and at the end of its stance, the calf comes
-        below CLEARANCE over the ground, and the hip out of reach
+        + MISS sum of how far, at touchdown, in the middle and at the end of its stance, the calf
+        comes below CLEARANCE over the ground, and the hip out of reach
 
-``edge`` falls from 1 at ``NEAR`` to 0 at ``NEAR_ENOUGH`` from the next cell that is higher or lower by
-more than ``STEP``, or unknown; ``range`` is that of the heights of the cells around it. It is chosen
-anew until ``LATEST`` of the swing, and gone over to at ``SLEW``; later only its height follows.
+``edge`` falls from 1 at ``NEAR`` to 0 at ``NEAR_ENOUGH`` from the next cell that is higher or lower
+by more than ``STEP``, or unknown; ``range`` is that of the heights of the cells around it. It is
+chosen anew until ``LATEST`` of the swing, and gone over to at ``SLEW``; later only its height
+follows.
 
-The swing goes up to a top over both of its ends and all that is between, and down; each part's time is
-by its height. It goes ahead between two moments, which are the nearest to the swing's begin and end
-between which it keeps ``OVER`` from what it passes. So the foot rises in front of a step, and goes ahead
-over the edge behind it before it comes down; on the level it goes ahead all the time.
+The swing goes up to a top over both of its ends and all that is between, and down; each part's time
+is by its height. It goes ahead between two moments, which are the nearest to the swing's begin and
+end between which it keeps ``OVER`` from what it passes. So the foot rises in front of a step, and
+goes ahead over the edge behind it before it comes down; on the level it goes ahead all the time.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from go2_wbc.algebra.linear import plus_scaled, triple
 from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
 from go2_wbc.planning.height_map import CELL, HeightMap, height_at
@@ -42,11 +44,15 @@ CLEARANCE, SHORTEST, LONGEST = 0.035, 0.14, 0.39
 LATEST, SLEW, AGAIN = 0.6, 2.5, 0.01
 """Share of a swing in which footholds are chosen, speed [m/s] at which they move, and time [s]
 between two choices."""
+MOVED = 0.25
+"""How far [m] a foothold may be moved as a swing begins, and times (1 - u)^2 at its share u. A foot
+that was sent to the other side of a gap in the middle of its swing came down inside."""
 LEAST_TOP, OVER_WAY, OVER = 0.06, 0.05, 0.02
 """Height [m] of a swing's top over its ends, over the ground between them, and of every other point
 over what it passes."""
 SHAPED, WAITS, WAIT = 0.1, 6, 0.06
-"""Share of the swing until which its shape is sought, and the moments tried: how many, how far apart."""
+"""Share of the swing until which its shape is sought, and the moments tried: how many, and how far
+apart."""
 LANDS = 0.03
 """Distance [m] from the map within which a contact late in the swing may be a landing."""
 
@@ -103,9 +109,19 @@ def leg_miss(m: HeightMap, hip: V3, way: V3, foot: V3, c: Walk) -> float:
 
 @subroutine
 def choose(
-    leg: int, now: Snapshot, s: Planner, c: Walk, m: HeightMap, remaining: float, blind: Array3
+    leg: int,
+    now: Snapshot,
+    s: Planner,
+    c: Walk,
+    m: HeightMap,
+    spans: tuple[float, float],
+    blind: Array3,
+    most: float,
 ) -> None:
-    """Choose the foothold of a foot, ``remaining`` [s] before it comes down ``blind``ly there."""
+    """Choose the foothold of a foot that has swung, and will, for so long [s].
+
+    ``blind``: where it would come down by the plane; ``most``: how far [m] from where it is led.
+    """
     step, yaw = s.feet[leg].step, s.trunk.yaw
     cosine, sine = np.cos(yaw), np.sin(yaw)
     v_x, v_y = world_velocity(s.trunk)
@@ -114,9 +130,8 @@ def choose(
     for i in range(3):
         for k in range(3):
             hip[i] += now.R_world_base[i, k] * c.p_base_hips[leg, k]
-    hip += remaining * np.array((v_x, v_y, climb))
-    hip[2] += s.trunk.pose[0]
-    way, at = (stance * v_x, stance * v_y, stance * climb), (hip[0], hip[1], hip[2])
+    way = (stance * v_x, stance * v_y, stance * climb)
+    at = plus_scaled(triple(hip), spans[1] / stance, way)
     best = np.inf
     for i in range(-ALONG, ALONG + 1):
         for j in range(-ACROSS, ACROSS + 1):
@@ -125,6 +140,8 @@ def choose(
                 continue
             x = blind[0] + CELL * (cosine * i - sine * j)
             y = blind[1] + CELL * (sine * i + cosine * j)
+            if np.hypot(x - step.goal[0], y - step.goal[1]) > most:
+                continue
             if np.hypot(x - step.chosen[0], y - step.chosen[1]) > CELL:
                 cost += STICKY
             z = height_at(m, x, y)
@@ -221,12 +238,13 @@ def swing_by_sight(
     foot, elapsed, remaining = s.feet[leg], spans[0], spans[1]
     step, swing, duration = foot.step, foot.swing, elapsed + remaining
     progress = elapsed / duration
-    if not step.is_sighted:
+    is_new = not step.is_sighted
+    if is_new:
         step.is_sighted, step.next = True, s.time
         step.chosen[:] = blind
-    is_new = step.next == s.time and elapsed < 2.0 * dt
     if s.time >= step.next - TIE and progress <= LATEST:
-        choose(leg, now, s, c, m, remaining, blind)
+        most = np.inf if is_new else MOVED * (1.0 - progress) ** 2
+        choose(leg, now, s, c, m, spans, blind, most)
         step.next = s.time + AGAIN
         if is_new:
             step.goal[:] = step.chosen

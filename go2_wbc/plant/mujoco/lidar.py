@@ -1,22 +1,24 @@
 """A lidar like the L1 below a Go2's nose, on the terrain of a simulated plant.
 
-Its rays fill a cone evenly, along a spiral that begins anew in each scan, as the sensor never repeats
-its pattern. They are cast against a model of the ground alone: against the meshes of the robot as well
-it took 100 times as long. The legs stand in the way all the same: a ray that passes within
-``LEG_RADIUS`` of one's axis returns nothing, as a driver leaves the robot itself out.
+Its rays fill a cone evenly, along a spiral that begins anew in each scan, as the sensor never
+repeats its pattern. They are cast against a model of the ground alone: against the meshes of the
+robot as well it took 100 times as long. The legs stand in the way all the same: a ray that passes
+within ``LEG_RADIUS`` of one's axis returns nothing, as a driver leaves the robot itself out.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
 
 import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
-from go2_wbc.errors import ConfigError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant.base import Scan
 from go2_wbc.plant.mujoco.model import add_floor, add_terrain
@@ -100,13 +102,7 @@ class Lidar:
         setup: PlantSetup,
         robot: tuple[mujoco.MjModel, mujoco.MjData],
     ) -> Lidar:
-        """That of a robot, in the place that its ``setup`` tells.
-
-        Raises:
-            ConfigError: with an mjcf, of which nobody knows what of it is ground.
-        """
-        if setup.mjcf is not None:
-            raise ConfigError("lidar is only for the built model, not for an mjcf")
+        """That of a robot, in the place that its ``setup`` tells."""
         config = LidarConfig() if lidar is True else lidar
         return Lidar(config, setup.terrain, robot, np.random.default_rng((setup.seed, config.rays)))
 
@@ -118,6 +114,16 @@ class Lidar:
         if self._told and time >= self._told[0].time + self._config.latency - ROUNDING:
             return self._told.popleft()
         return None
+
+    def save(self) -> Mapping[str, Any]:
+        """All that the next scans depend on, besides the robot."""
+        state = self._rng.bit_generator.state
+        return MappingProxyType({"noise": state, "told": tuple(self._told), "next": self._next})
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go back to what ``save`` returned."""
+        self._rng.bit_generator.state = saved["noise"]
+        self._told, self._next = deque(saved["told"]), saved["next"]
 
     def _take(self, time: float) -> Scan:
         config, rng, robot = self._config, self._rng, self._robot

@@ -222,6 +222,7 @@ def add_floor(spec: mujoco.MjSpec) -> None:
 
 
 def add_terrain(spec: mujoco.MjSpec, terrain: Terrain, friction: float) -> None:
+    """Adds a terrain to a floor."""
     floor = spec.geom(FLOOR)
     floor.quat, floor.pos = _quaternion(0.0, terrain.floor_pitch), [0.0, 0.0, terrain.floor_height]
     for index, block in enumerate((*terrain.blocks(), *terrain.banks())):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 from collections import deque
 from functools import partial
 from pathlib import Path
@@ -24,7 +23,7 @@ from go2_wbc.plant.mujoco.lidar import Lidar, LidarConfig
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
 from go2_wbc.plant.mujoco.pushes import Pushes
 from go2_wbc.plant.mujoco.settling import settle
-from go2_wbc.plant.mujoco.setup import PlantSetup, SavedPhysics, prepare
+from go2_wbc.plant.mujoco.setup import PlantSetup, SavedPhysics, command_numbers, prepare
 from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors, SensorNoise
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.records import packed
@@ -113,6 +112,10 @@ class MujocoPlant(Plant):
     ) -> None:
         if sensors not in SENSORS:
             raise ConfigError(unknown_name("sensors", sensors, SENSORS))
+        if lidar and mjcf is not None:
+            raise ConfigError(
+                "lidar is only for the built model: of an mjcf nobody knows the ground"
+            )
         setup = PlantSetup(
             mjcf=mjcf,
             urdf=urdf,
@@ -245,7 +248,7 @@ class MujocoPlant(Plant):
             ClosedError: after ``close()``.
         """
         self._check_open()
-        self._waiting.append(_numbers_of(command))
+        self._waiting.append(command_numbers(command))
         if len(self._waiting) > self._late:
             self._acting = self._waiting.popleft()
         model, data = self._model, self._data
@@ -406,6 +409,7 @@ class MujocoPlant(Plant):
             imu=self._imu,
             senses=None if self._senses is None else self._senses.save(),
             faults=self._faults.save(),
+            lidar=None if self._lidar is None else self._lidar.save(),
         )
 
     @typed(late=True)
@@ -425,6 +429,8 @@ class MujocoPlant(Plant):
         if self._senses is not None and saved.senses is not None:
             self._senses.restore(saved.senses)
         self._faults.restore(saved.faults)
+        if self._lidar is not None and saved.lidar is not None:
+            self._lidar.restore(saved.lidar)
 
     def close(self) -> None:
         """Ends the plant; every later call but ``close`` raises ``ClosedError``."""
@@ -482,24 +488,3 @@ class MujocoPlant(Plant):
         rows = (contact.geom, contact.efc_address, contact.dim, data.efc_force)
         bin_forces(*rows, codes, self._is_elliptic, forces)
         return forces
-
-
-def _numbers_of(command: JointCommand) -> Float[np.ndarray, "5 12"]:
-    """The numbers of a command, in the order that the motors read.
-
-    Raises:
-        CommandError: if it has a value that is not finite, or an array of the wrong shape.
-    """
-    rows = [getattr(command, name) for name in _COMMANDED]
-    for name, row in zip(_COMMANDED, rows, strict=True):
-        if row.shape != (12,):
-            raise CommandError(f"command.{name} must have shape (12,), got {row.shape}")
-    numbers = np.array(rows, dtype=float)
-    if not math.isfinite(np.vdot(numbers, numbers)):  # cheap, but huge numbers overflow
-        for name, row in zip(_COMMANDED, rows, strict=True):
-            if not np.isfinite(row).all():
-                raise CommandError(f"command.{name} is not finite: {row}")
-    return numbers
-
-
-_COMMANDED = ("tau", "q_des", "v_des", "kp", "kd")
