@@ -41,7 +41,7 @@ PIT = 0.24
 UNEVEN, UNEVEN_WAY = 0.04, 0.4
 """Height [m] of a step on ``GRID`` from which on ground is uneven, and for how far [m] that is
 remembered."""
-LOOK = 0.9
+LOOK = 1.1
 """How far ahead [m] uneven ground counts."""
 SPEED, FLIGHT_SPEED = 0.46, 0.32
 """Greatest speed [m/s] on it, and on a flight of stairs: of"""
@@ -54,8 +54,9 @@ GREATEST_STEP, GREATEST_GAP = 0.24, 0.38
 """Height [m] of a step and length [m] of a hole that the robot does not try."""
 EVEN, FOOT_CELLS = 0.04, 3
 """Cells in a row that a foot needs, and the height [m] by which two of them may differ."""
-FAR, LINE = 1.15, 0.15
-"""How far ahead [m] its way is looked along, and how far aside [m] the feet go."""
+FAR, LINE, MOVED_ASIDE = 1.15, 0.15, 0.075
+"""How far ahead [m] its way is looked along, how far aside [m] the feet go, and how far from there
+they can be put."""
 STOP, BRAKING = 0.60, 0.5
 """Distance [m] of the CoM from the end of its way at which it has stopped, and the deceleration
 [m/s^2] of what it is told."""
@@ -178,6 +179,13 @@ def unevenness(
 
 
 @subroutine
+def beside(m: HeightMap, x: float, y: float, way: V3, off: tuple[float, float]) -> float:
+    """Height [m] of the ground so far ahead and aside of a way."""
+    ahead, left = off
+    return height_at(m, x + way[0] * ahead - way[1] * left, y + way[1] * ahead + way[0] * left)
+
+
+@subroutine
 def way_ahead(m: HeightMap, x: float, y: float, way: V3, here: float) -> tuple[float, float]:
     """What ends a way (0 for nothing), and how far ahead [m] that is.
 
@@ -188,19 +196,22 @@ def way_ahead(m: HeightMap, x: float, y: float, way: V3, here: float) -> tuple[f
     for line in range(-1, 2):
         last, at, low, high, run, before = here, 0.0, 0, 0, 0, here
         for n in range(steps + 1):
-            ahead = n * CELL
-            dx, dy = way[0] * ahead - way[1] * line * LINE, way[1] * ahead + way[0] * line * LINE
-            z = height_at(m, x + dx, y + dy)
+            ahead = (n + 0.5) * CELL
+            z = beside(m, x, y, way, (ahead, line * LINE))
+            high = high + 1 if z > last + GREATEST_STEP else 0
+            if high > 1:
+                if ahead - 1.5 * CELL < end:
+                    what, end = RISE, ahead - 1.5 * CELL
+                break
+            for side in (-MOVED_ASIDE, MOVED_ASIDE):
+                other = beside(m, x, y, way, (ahead, line * LINE + side))
+                if not abs(z - last) < abs(other - last):
+                    z = other
             if np.isnan(z):
                 continue
             run = run + 1 if abs(z - before) < EVEN else 1
             before = z
             low = low + 1 if z < last - GREATEST_STEP else low
-            high = high + 1 if z > last + GREATEST_STEP else 0
-            if high > 1:
-                if ahead < end:
-                    what, end = RISE, ahead
-                break
             if low > 0 and ahead - at > GREATEST_GAP:
                 if at < end:
                     what, end = DROP, at

@@ -208,9 +208,10 @@ def shape(leg: int, s: Planner, c: Walk, m: HeightMap) -> None:
                 px, py = a[0] + x * (b[0] - a[0]), a[1] + x * (b[1] - a[1])
                 side = 1.0 if u < step.peak else -1.0
                 base = a[2] if u < step.peak else b[2]
-                ground = height_at(m, px + side * ahead_x, py + side * ahead_y)
-                if ground > base - r + OVER:
-                    cost += max(ground + OVER - z + r, 0.0) / OVER
+                for k in range(2):  # below the foot, and in front of it, or behind it going down
+                    ground = height_at(m, px + k * side * ahead_x, py + k * side * ahead_y)
+                    if ground > base - r + OVER:
+                        cost += max(ground + OVER - z + r, 0.0) / OVER
             if cost < best:
                 best, step.begin, step.end = cost, begin, end
 

@@ -8,7 +8,7 @@ from go2_wbc.plant.mujoco.lidar import ground_model
 from go2_wbc.plant.terrain import Terrain
 
 DOWN = np.array([0.0, 0.0, -1.0])
-ABOVE = 3.0
+ABOVE, BASE = 3.0, np.array([0.0, 0.0, 0.3])
 
 
 def true_heights(terrain: Terrain | None, places: np.ndarray) -> np.ndarray:
@@ -30,6 +30,6 @@ def grid(start: float, end: float, aside: float = 0.35) -> np.ndarray:
 def exact_map(terrain: Terrain | None, start: float = -1.0, end: float = 1.8) -> HeightMap:
     """The map of a terrain on which the robot stands at the origin."""
     heights, places = HeightMap(), grid(start, end)
-    points = np.column_stack([places, true_heights(terrain, places)])
-    fuse(heights, points, np.zeros(3), np.eye(3), 0.001)
+    points = np.column_stack([places, true_heights(terrain, places) - BASE[2]])
+    fuse(heights, points, BASE, np.eye(3), 0.001)
     return heights
