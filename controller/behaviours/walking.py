@@ -20,6 +20,9 @@ from go2_wbc.robot.state import Snapshot
 
 _log = logging.getLogger(__name__)
 
+STEADYING = 0.15
+"""Speed [m/s] up to which a command only keeps the robot in its place, as while it turns."""
+
 
 class Walking(Behaviour):
     """Walk with ``gait`` and follow ``command`` and ``pose``; stand ready without command.
@@ -129,8 +132,8 @@ class Walking(Behaviour):
     @property
     def blocked(self) -> str:
         """What stops the robot that is commanded to go on, in plain words; "" if nothing does."""
-        sight = self._planner.sight
-        return sight.why_blocked if sight.is_slowed else ""
+        sight, asked = self._planner.sight, np.hypot(self.command.linear_x, self.command.linear_y)
+        return sight.why_blocked if sight.is_slowed and asked > STEADYING else ""
 
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether the robot has come to rest."""
