@@ -31,6 +31,7 @@ from controller.modes import (
 from controller.navigation import Goal
 from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
+from controller.seen_terrain import SeenTerrain
 from controller.walker import Walker
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
@@ -88,6 +89,12 @@ class Pilot:
     def excess(self, command: VelocityCommand) -> tuple[int, str]:
         """How far ``command`` is beyond what is followed (0 if not, 2 by far), and in words."""
         return self._walker.excess(command)
+
+    @property
+    def terrain(self) -> SeenTerrain | None:
+        """The ground as it has been seen; None if nothing has."""
+        heights = self._loop.heights
+        return SeenTerrain(heights, self._walker.walking.blocked) if heights.is_used else None
 
     @property
     def body_pose(self) -> BodyPose:
@@ -254,10 +261,11 @@ class Pilot:
                 if self._goal is None:
                     return True
                 self._walker.follow(goal.command(loop.state))
-                return goal.is_done(loop.state)
+                return goal.is_done(loop.state) or bool(self._walker.walking.blocked)
 
             goal.begin(loop.state)
             self._runner.until(is_over, goal.time_limit, goal.name)
+            blocked = self._walker.walking.blocked
             self.rest()
             was_halted = self._goal is None
         finally:
@@ -265,6 +273,8 @@ class Pilot:
         measured = goal.measurements(loop.state)
         if was_halted:
             raise Aborted(f"{goal.name} ended by stop()", measured)
+        if blocked:
+            raise Aborted(f"{goal.name} ended: {blocked}; {listed(measured)}", measured)
         if why := told(goal.errors(loop.state)):
             raise Aborted(f"{goal.name} missed: {why}; {listed(measured)}", measured)
         return measured

@@ -148,6 +148,7 @@ class Ground(Record):
         roughness: distance [m] from the plane at which feet were met lately.
         rough_way: for how far [m] it is taken for rough yet.
         high_way: for how far [m] steps are taken for high yet.
+        steeper: share of the slope by which the trunk follows it more.
     """
 
     height: float
@@ -157,6 +158,7 @@ class Ground(Record):
     roughness: float
     rough_way: float
     high_way: float
+    steeper: float
 
 
 def ground_below(now: Snapshot, foot_radius: float) -> Ground:
@@ -216,7 +218,8 @@ def delay(g: Ground) -> float:
 @subroutine
 def tilt(g: Ground) -> tuple[float, float]:
     """Slope that the trunk follows."""
-    return FOLLOW * g.slope[0], FOLLOW * g.slope[1]
+    follow = FOLLOW + g.steeper
+    return follow * g.slope[0], follow * g.slope[1]
 
 
 @subroutine
