@@ -38,6 +38,7 @@ from go2_wbc.planning.ground import (
     level_friction,
     note_stumble,
     observe_slip,
+    on_leash,
     slow_down,
 )
 from go2_wbc.planning.height_map import HeightMap
@@ -259,6 +260,7 @@ def plan(
     note_liftoffs(now, s, c, contact, stance, progress)
     target.friction = level_friction(s.ground, s.slip.friction, LEAST_FRICTION)
     fill_body(s.trunk, s.ground, c.height + s.sight.lift, target)
+    target.p_world[2] = on_leash(s.ground, c.config.rough, target.p_world[2], now)
     level(s.trunk, now, contact, s.is_stepping, dt, target)
     fill_feet(now, s, c, stance, stands, elapsed, remaining, target, m, dt)
     target.q_joints[:] = now.q[7:]
