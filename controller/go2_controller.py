@@ -17,6 +17,7 @@ from controller.assembly import build_pilot
 from controller.modes import Aborted, Measurements, Mode, Outcome
 from controller.navigation import DriveStraight, TurnInPlace
 from controller.pacing import REASON, LogOnce
+from controller.seen_terrain import SeenTerrain
 from controller.telemetry import Telemetry
 from go2_wbc.arguments import typed
 from go2_wbc.config import Config
@@ -350,6 +351,11 @@ class GO2Controller:
     def state(self) -> RobotState:
         """The newest measured state, a copy that cannot be written into."""
         return self._runner.loop.state.read_only()
+
+    @property
+    def terrain(self) -> SeenTerrain | None:
+        """The ground as it has been seen; None before the first scan, and without a lidar."""
+        return self._pilot.terrain
 
     @property
     def mode(self) -> Mode:

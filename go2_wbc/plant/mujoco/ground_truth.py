@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from go2_wbc.legs import JOINT_NAMES
-from go2_wbc.plant.base import Plant
+from go2_wbc.plant.base import Plant, Scan
 from go2_wbc.plant.mujoco.contacts import Contacts, foot_contacts, touches_itself
 from go2_wbc.plant.mujoco.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
@@ -154,6 +154,10 @@ class GroundTruth(Plant):
     def read(self) -> RobotState:
         """The measured state."""
         return self._plant.read()
+
+    def scan(self) -> Scan | None:
+        """See ``Plant.scan``."""
+        return self._plant.scan()
 
     def write(self, command: JointCommand) -> None:
         """Apply ``command`` for one control period, and record what came of it."""
