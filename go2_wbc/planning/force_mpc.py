@@ -79,7 +79,7 @@ def fill_goals(s: Planner, c: Walk, command: Command) -> None:
     a, b = tilt(s.ground)
     steep = np.hypot(a, b)
     share = np.arctan(steep) / steep if steep > 0.0 else 1.0
-    linear = haste(s.ground, s.slip.friction) * config.linear_acceleration
+    linear = haste(s.ground, s.slip.friction, s.delay) * config.linear_acceleration
     goals[:] = 0.0
     for k in range(NODES):
         ramp(velocity, command, linear, config.angular_acceleration, STEP)
@@ -92,7 +92,8 @@ def fill_goals(s: Planner, c: Walk, command: Command) -> None:
         goals[k, 2], goals[k, 8] = yaw - s.trunk.yaw, velocity[2]
         goals[k, 3], goals[k, 4] = x, y
         goals[k, 0], goals[k, 1] = share * b, -share * a
-        goals[k, 5] = ground_at(s.ground, x, y) + c.height + s.trunk.height_offset
+        goals[k, 5] = ground_at(s.ground, x, y) + c.height + s.sight.lift
+        goals[k, 5] += s.trunk.height_offset
         goals[k, 11] = s.ground.slope[0] * goals[k, 9] + s.ground.slope[1] * goals[k, 10]
 
 
@@ -163,7 +164,7 @@ def fill_arms(now: Snapshot, s: Planner, c: Walk) -> None:
     for leg in range(4):
         remaining = max(landings[0, leg], 0.0) * period
         foothold(leg, now, s, c, nominal, remaining, goal)
-        footholds[leg] = goal[:2]
+        footholds[leg] = s.feet[leg].step.goal[:2] if s.feet[leg].step.is_sighted else goal[:2]
     here_x, here_y = s.trunk.position[0], s.trunk.position[1]
     before_x, before_y = here_x, here_y
     excess_x, excess_y = excess_velocity(now, s, c)
@@ -186,6 +187,8 @@ def fill_arms(now: Snapshot, s: Planner, c: Walk) -> None:
                 arm[0] = footholds[leg, 0] - com[0] - way_x
                 arm[1] = footholds[leg, 1] - com[1] - way_y
                 arm[2] = ground_at(s.ground, footholds[leg, 0], footholds[leg, 1]) - com[2]
+                if s.feet[leg].step.is_sighted:
+                    arm[2] = s.feet[leg].step.goal[2] - c.foot_radius - com[2]
             else:
                 yaw = s.trunk.yaw + rate * wait
                 cosine, sine = np.cos(yaw), np.sin(yaw)
@@ -194,8 +197,12 @@ def fill_arms(now: Snapshot, s: Planner, c: Walk) -> None:
                 hip_x, hip_y = cosine * x - sine * y, sine * x + cosine * y
                 early = duty * period / 2 + wait - (k + 0.5) * STEP
                 v_x, v_y = goals[k, 9] + excess_x * left, goals[k, 10] + excess_y * left
-                arm[0] = base[0] - com[0] + hip_x + (v_x - rate * hip_y) * early
-                arm[1] = base[1] - com[1] + hip_y + (v_y + rate * hip_x) * early
+                last, next = max(k - 1, 0), min(k + 1, NODES - 1)
+                fall = c.height / c.gravity / (STEP * (next - last))
+                lean_x = fall * (goals[next, 9] - goals[last, 9])
+                lean_y = fall * (goals[next, 10] - goals[last, 10])
+                arm[0] = base[0] - com[0] + hip_x + (v_x - rate * hip_y) * early - lean_x
+                arm[1] = base[1] - com[1] + hip_y + (v_y + rate * hip_x) * early - lean_y
                 arm[2] = ground_at(s.ground, com[0] + arm[0], com[1] + arm[1]) - com[2]
 
 

@@ -77,8 +77,12 @@ steep: on stairs every other foot tells it anew, but on a ramp of 22 deg it is o
 and 3 of 10 robots fell behind it that still walked as on stairs."""
 FIRST_WAY = 0.5
 """For how far [m] the first step is taken for a high one."""
-HASTE_FRICTION = 0.4
-"""Friction from which on the ground bears the greatest acceleration."""
+HASTE_FRICTION = 0.45
+"""Friction from which on the ground bears the greatest acceleration; on less it falls with the
+square: what slid once shows less than there is, and goes on at once on ground that has it."""
+PROMPT, LATE, LATE_HASTE = 0.003, 0.008, 0.4
+"""Lateness of the commands [s] up to which the robot speeds up by all that the ground bears, and
+from which on it does by the last share of it."""
 ROUGH_HASTE = 1.0 / 3.0
 """Share of the accelerations that is left there."""
 CALMING = 0.8
@@ -161,6 +165,7 @@ class Ground(Record):
         roughness: distance [m] from the plane at which feet were met lately.
         rough_way: for how far [m] it is taken for rough yet.
         high_way: for how far [m] steps are taken for high yet.
+        steeper: share of the slope by which the trunk follows it more.
     """
 
     height: float
@@ -170,6 +175,7 @@ class Ground(Record):
     roughness: float
     rough_way: float
     high_way: float
+    steeper: float
 
 
 def ground_below(now: Snapshot, foot_radius: float) -> Ground:
@@ -241,7 +247,8 @@ def delay(g: Ground) -> float:
 @subroutine
 def tilt(g: Ground) -> tuple[float, float]:
     """Slope that the trunk follows."""
-    return FOLLOW * g.slope[0], FOLLOW * g.slope[1]
+    follow = FOLLOW + g.steeper
+    return follow * g.slope[0], follow * g.slope[1]
 
 
 @subroutine
@@ -262,9 +269,14 @@ def level_friction(g: Ground, friction: float, least: float) -> float:
 
 
 @subroutine
-def haste(g: Ground, friction: float) -> float:
-    """Share of the greatest acceleration that the ground bears, by its ``friction`` and slope."""
-    share = min(level_friction(g, friction, LEAST_FRICTION) / HASTE_FRICTION, 1.0)
+def haste(g: Ground, friction: float, delay: float) -> float:
+    """Share of the greatest acceleration that the robot is given.
+
+    By the ``friction`` and slope of the ground, and by how late the commands act [s].
+    """
+    share = min(level_friction(g, friction, LEAST_FRICTION) / HASTE_FRICTION, 1.0) ** 2
+    late = min(max((delay - PROMPT) / (LATE - PROMPT), 0.0), 1.0)
+    share = min(share, 1.0 - (1.0 - LATE_HASTE) * late)
     return ROUGH_HASTE * share if is_rough(g) else share
 
 

@@ -13,9 +13,11 @@ from go2_wbc.planning import ground, swing
 from go2_wbc.planning.gait_clock import Cadence, Clock
 from go2_wbc.planning.ground import Ground, RoughConfig, Slip
 from go2_wbc.planning.mpc import Horizon, MpcConfig
-from go2_wbc.planning.swing import FootContact, Swing, SwingConfig
+from go2_wbc.planning.sight import Sight
+from go2_wbc.planning.swing import FootContact, Step, Swing, SwingConfig
 from go2_wbc.planning.trunk import PoseConfig, Trunk
 from go2_wbc.records import Record
+from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Retired, past_table, ranged, retires
 
@@ -63,9 +65,8 @@ class LocomotionConfig:
         height: CoM height [m] above the ground.
         compression: by which feet under the trunk's weight are pressed flat, or into the ground,
             [m]: in MuJoCo 1 to 6 mm, by the friction of the joints.
-        linear_acceleration: greatest change of the commanded velocity [m/s^2] on a friction of
-            0.4 and more; on less it is as much less (``ground.haste``). By 3 and more robots that
-            turned round at 2 m/s fell on their own sensors.
+        linear_acceleration: greatest change of the commanded velocity [m/s^2], where the ground
+            bears it and the commands act at once; else as much less as ``ground.haste`` says.
         angular_acceleration: greatest change of the commanded turning rate [rad/s^2].
         velocity_feedback: foothold offset [s] per velocity error.
         stride_margin: speed [m/s] that the robot may have beyond the commanded one before the
@@ -91,7 +92,7 @@ class LocomotionConfig:
 
     height: float = 0.29
     compression: float = 0.004
-    linear_acceleration: float = 2.5
+    linear_acceleration: float = 6.0
     angular_acceleration: float = 4.0
     velocity_feedback: float = 0.12
     stride_margin: float = 0.4
@@ -141,6 +142,8 @@ class Walk:
         foot_radius: [m].
         p_base_feet_nominal: places of the feet below the hips, from the base [m].
         stands_beside_com: whether at times only the feet of one side, or of one end, stand.
+        p_base_hips: where the thighs' axes meet the legs' planes, in the base frame [m].
+        link: length of a thigh, and of a calf [m].
     """
 
     config: LocomotionConfig
@@ -151,10 +154,13 @@ class Walk:
     foot_radius: float
     p_base_feet_nominal: Float[np.ndarray, "4 3"]
     stands_beside_com: bool
+    p_base_hips: Float[np.ndarray, "4 3"]
+    link: float
 
     @staticmethod
     def of(model: RobotModel, gait: Gait, config: LocomotionConfig) -> Walk:
         """Those of a robot that walks with ``gait``."""
+        legs = leg_table(model).geometry
         return Walk(
             replace(config, swing=config.swing.at_most(gait.apex)),
             Cadence.of(gait, config.rough),
@@ -164,14 +170,17 @@ class Walk:
             model.foot_radius,
             model.p_base_feet_nominal,
             gait.stands_beside_com,
+            np.array([leg.p_base_hip + [0.0, leg.width, 0.0] for leg in legs]),
+            0.5 * (legs[0].thigh + legs[0].calf),
         )
 
 
 class Foot(Record):
-    """What the planner remembers of a foot: its contact and its swing."""
+    """What the planner remembers of a foot: its contact, its swing, and that by sight."""
 
     contact: FootContact
     swing: Swing
+    step: Step
 
 
 class Rest(Record):
@@ -206,11 +215,13 @@ class Planner(Record):
     Attributes:
         time: of the last tick [s].
         is_stepping: whether the gait is running.
+        delay: after which commands act [s].
         horizon: what the MPC has looked at last.
     """
 
     time: float
     is_stepping: bool
+    delay: float
     clock: Clock
     trunk: Trunk
     ground: Ground
@@ -219,3 +230,4 @@ class Planner(Record):
     feet: tuple[Foot, Foot, Foot, Foot]
     planned: PlannedForces
     horizon: Horizon
+    sight: Sight

@@ -73,7 +73,7 @@ def test_the_planner_compiled_is_the_planner_as_it_is_written(
         reference = planner.update(now, command, pose)
         told = now.state.feet_in_contact, now.state.tau, state, planner._walk, planner._command
         with np.errstate(all="ignore"), suppress(Skipped):
-            plain(plan)(now, np.float64(now.state.time), *told, target)
+            plain(plan)(now, np.float64(now.state.time), *told, target, planner._heights)
             np.testing.assert_allclose(target.row, reference.row, rtol=0, atol=ROUNDING)
             np.testing.assert_allclose(state.row, planner._state.row, rtol=0, atol=ROUNDING)
         starts += planner.is_stepping and not was_stepping
