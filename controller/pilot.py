@@ -14,16 +14,20 @@ from functools import partial
 from controller.acceptance import Acceptance
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.standing import Standing
-from controller.checks import (
+from controller.modes import (
     LYING_HEIGHT,
+    Aborted,
+    Measurements,
+    Mode,
     base_height,
     is_standing,
+    listed,
     lying,
     sitting,
     standing,
+    told,
     why_not_standing,
 )
-from controller.modes import Aborted, Measurements, Mode, listed, told
 from controller.navigation import Goal
 from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
@@ -36,7 +40,7 @@ from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.trunk import LEVEL, BodyPose
 from go2_wbc.plant import Plant
-from motions.postures import lie_down, rise, sit_down
+from motions.postures import lie_down, rise, sit_down, sit_raise
 
 READY_TIME = 0.2
 """Time [s] that a robot is given to stand ready in walking mode."""
@@ -141,7 +145,10 @@ class Pilot:
         """Sit like a dog, from any mode but fallen."""
         if self.mode is not Mode.SITTING:
             self._ensure_standing()
-            self._take_posture(ChangePosture(partial(sit_down, profile=self._loop.model.profile)))
+            model = self._loop.model
+            raised = sit_raise(self._loop.snapshot.p_world_feet, model)
+            sit = partial(sit_down, profile=model.profile, raised=raised)
+            self._take_posture(ChangePosture(sit))
         return self._settle(Posture.SIT, "sit")
 
     def lie_down(self) -> Measurements:

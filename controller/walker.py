@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from controller.behaviours.walking import Walking
-from controller.checks import calm
-from controller.modes import Limited
+from controller.modes import Limited, calm
 from controller.runner import Runner
 from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS, Gait, find_gait

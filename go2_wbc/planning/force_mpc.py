@@ -21,7 +21,7 @@ from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
 from go2_wbc.planning.footholds import foothold, nominal_feet
 from go2_wbc.planning.gait_clock import Clock
-from go2_wbc.planning.ground import ground_at, haste, tilt
+from go2_wbc.planning.ground import ground_at, haste, is_rough, on_leash, tilt
 from go2_wbc.planning.mpc import INTERVAL, NODES, STEP, Horizon, solve_mpc
 from go2_wbc.planning.trunk import Command, advance_pose, pose_turn, ramp
 from go2_wbc.planning.walk import Planner, Walk
@@ -79,7 +79,7 @@ def fill_goals(s: Planner, c: Walk, command: Command) -> None:
     a, b = tilt(s.ground)
     steep = np.hypot(a, b)
     share = np.arctan(steep) / steep if steep > 0.0 else 1.0
-    linear = haste(s.ground, s.slip.friction) * config.linear_acceleration
+    linear = haste(s.ground, s.slip.friction, s.delay) * config.linear_acceleration
     goals[:] = 0.0
     for k in range(NODES):
         ramp(velocity, command, linear, config.angular_acceleration, STEP)
@@ -197,8 +197,12 @@ def fill_arms(now: Snapshot, s: Planner, c: Walk) -> None:
                 hip_x, hip_y = cosine * x - sine * y, sine * x + cosine * y
                 early = duty * period / 2 + wait - (k + 0.5) * STEP
                 v_x, v_y = goals[k, 9] + excess_x * left, goals[k, 10] + excess_y * left
-                arm[0] = base[0] - com[0] + hip_x + (v_x - rate * hip_y) * early
-                arm[1] = base[1] - com[1] + hip_y + (v_y + rate * hip_x) * early
+                last, next = max(k - 1, 0), min(k + 1, NODES - 1)
+                fall = c.height / c.gravity / (STEP * (next - last))
+                lean_x = fall * (goals[next, 9] - goals[last, 9])
+                lean_y = fall * (goals[next, 10] - goals[last, 10])
+                arm[0] = base[0] - com[0] + hip_x + (v_x - rate * hip_y) * early - lean_x
+                arm[1] = base[1] - com[1] + hip_y + (v_y + rate * hip_x) * early - lean_y
                 arm[2] = ground_at(s.ground, com[0] + arm[0], com[1] + arm[1]) - com[2]
 
 
@@ -216,6 +220,8 @@ def look_ahead(now: Snapshot, s: Planner, c: Walk, command: Command) -> None:
     fill_contacts(s.clock, s.horizon)
     fill_arms(now, s, c)
     lean_goals(s, c, command)
+    for k in range(NODES):
+        s.horizon.goals[k, 5] = on_leash(s.ground, c.config.rough, s.horizon.goals[k, 5], now)
 
 
 @subroutine
@@ -263,4 +269,5 @@ def apply_force_plan(now: Snapshot, s: Planner, c: Walk, command: Command, targe
     target.a_world[2] -= c.gravity
     target.force_weight = mpc.prior_weight
     x, y = excess_velocity(now, s, c)
-    target.orientation_discount = np.hypot(x, y) / mpc.throw_speed
+    ease = c.config.rough.ease if is_rough(s.ground) else 0.0
+    target.orientation_discount = max(np.hypot(x, y) / mpc.throw_speed, ease)

@@ -111,12 +111,6 @@ class TruthRecording:
         return np.minimum(q - model.q_lower, model.q_upper - q).min(axis=1)
 
 
-def true_runs(flags: Bool[np.ndarray, " n"]) -> list[slice]:
-    """Where ``flags`` is true without a gap, in order."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
 @final
 class GroundTruth(Plant):
     """Passes everything on to a ``MujocoPlant`` and records its state since the last ``clear``.

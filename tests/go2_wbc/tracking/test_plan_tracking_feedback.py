@@ -11,7 +11,7 @@ from go2_wbc.reference import Anchor, LegTask, Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.state import Snapshot
-from go2_wbc.tracking.plan_feedback import acceleration_of, fed_back, state_error
+from go2_wbc.tracking.plan_tracking import acceleration_of, fed_back, state_error
 from tests.engine_helpers import holding_reference, random_state
 
 MODEL = RobotModel()

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from go2_wbc.errors import TimelineError
 from motions import Timeline
-from motions.language.clock import BeatClock
 from motions.language.keys import BalanceShift, LegKey
+from motions.language.timeline_data import BeatClock
 
 EXACT = 1e-9
 SONG = (0.5, 1.0, 1.6, 2.4)

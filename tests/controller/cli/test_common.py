@@ -8,7 +8,7 @@ from typing import Annotated
 
 import pytest
 
-from controller.cli.options import add_command
+from controller.cli.common import add_command
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

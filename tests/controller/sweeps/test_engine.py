@@ -11,9 +11,8 @@ from pathlib import Path
 import pytest
 
 from controller import sweep
-from controller.sweeps.local import Worker
-from controller.sweeps.rows import Row
-from controller.sweeps.worker import order_of
+from controller.sweeps.engine import Worker, order_of
+from controller.sweeps.sweep_file import Row
 from tests.controller.sweeps import swept
 
 HANG_GUARD = 120.0

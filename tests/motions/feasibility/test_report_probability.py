@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from motions import check
 from motions.feasibility import report
-from motions.feasibility.probability import ProbabilityModel, Rise
+from motions.feasibility.report import ProbabilityModel, Rise
 
 MODEL = ProbabilityModel({"slip": Rise(0.01, 0.5, 0.4), "torque": Rise(2.0, -1.0, 0.5)}, rest=3.0)
 MARGINS = st.floats(-1e6, 1e6)
