@@ -3,14 +3,15 @@
 A foothold is the cell near to where the foot would be put down blindly (``footholds``), at a
 distance d, that costs least:
 
-    (d / FAR)^2 + EDGE edge + (range / FLAT)^2 + UNKNOWN [not known] + STICKY [not the one before]
+    (d / FAR)^2 + EDGE edge + (range / FLAT)^2 + UNKNOWN [not known] + STICKY (way / FAR)^2
         + MISS sum of how far, at touchdown, in the middle and at the end of its stance, the calf
         comes below CLEARANCE over the ground, and the hip out of reach
 
-``edge`` falls, as a square, from 1 at ``NEAR`` to 0 at ``NEAR_ENOUGH`` from the next cell that is
-lower by more than ``STEP``, or unknown, or a little nearer if it is higher; ``range`` is that of
-the heights of the cells around it. It is chosen anew until ``LATEST`` of the swing, and gone over
-to at ``SLEW``; later only its height follows.
+``way`` is that from where the foot is led at present: what the trunk's velocity does within a
+stride must not send it to and fro. ``edge`` falls, as a square, from 1 at ``NEAR`` to 0 at
+``NEAR_ENOUGH`` from the next cell that is lower by more than ``STEP``, or unknown, or a little
+nearer if it is higher; ``range`` is that of the heights of the cells around it. It is chosen anew
+until ``LATEST`` of the swing, and gone over to at ``SLEW``; later only its height follows.
 
 The swing goes up to a top over both of its ends and all that is between, and down; each part's time
 is by its height. It goes ahead between two moments, which are the nearest to the swing's begin and
@@ -36,15 +37,15 @@ ALONG, ACROSS = 7, 3
 """Cells by which a foothold may be moved ahead and aside, either way."""
 FAR, FLAT, MISS = 0.06, 0.02, 150.0
 """Distance [m] and range of heights [m] that cost 1, and what a metre of missing room costs."""
-EDGE, UNKNOWN, STICKY = 10.0, 15.0, 0.5
+EDGE, UNKNOWN, STICKY = 10.0, 15.0, 1.0
 NEAR, NEAR_ENOUGH, STEP, HIGHER = 0.036, 0.085, 0.035, 0.015
 """Distances [m] of an edge, its height [m], and by how much nearer [m] one may be that is
 higher."""
 CLEARANCE, SHORTEST, LONGEST = 0.035, 0.14, 0.39
 """Height [m] of the calf's axis over the ground, and lengths [m] from hip to foot."""
-LATEST, SLEW, AGAIN = 0.6, 2.5, 0.01
-"""Share of a swing in which footholds are chosen, speed [m/s] at which they move, and time [s]
-between two choices."""
+LATEST, SLEW, RISE, AGAIN = 0.6, 2.5, 1.0, 0.01
+"""Share of a swing in which footholds are chosen, speeds [m/s] at which they and a swing's top
+move, and time [s] between two choices."""
 MOVED = 0.25
 """How far [m] a foothold may be moved as a swing begins, and times (1 - u)^2 at its share u. A foot
 that was sent to the other side of a gap in the middle of its swing came down inside."""
@@ -141,10 +142,11 @@ def choose(
                 continue
             x = blind[0] + CELL * (cosine * i - sine * j)
             y = blind[1] + CELL * (sine * i + cosine * j)
-            if np.hypot(x - step.goal[0], y - step.goal[1]) > most:
+            moved = np.hypot(x - step.goal[0], y - step.goal[1])
+            if moved > most:
                 continue
-            if np.hypot(x - step.chosen[0], y - step.chosen[1]) > CELL:
-                cost += STICKY
+            if most < np.inf:
+                cost += STICKY * (moved / FAR) ** 2
             z = height_at(m, x, y)
             if np.isnan(z):
                 cost, z = cost + UNKNOWN, blind[2] - c.foot_radius
@@ -184,13 +186,20 @@ def height_of_swing(swing: Swing, top: float, peak: float, end: float, u: float)
 
 
 @subroutine
+def top_of(leg: int, s: Planner, c: Walk, m: HeightMap) -> float:
+    """Greatest height [m] that a swing needs."""
+    start, goal = s.feet[leg].swing.start, s.feet[leg].step.goal
+    over = ground_over(m, start, goal) + c.foot_radius + OVER_WAY
+    return max(max(start[2], goal[2]) + LEAST_TOP, over)
+
+
+@subroutine
 def shape(leg: int, s: Planner, c: Walk, m: HeightMap) -> None:
     """Find the top of a swing, when it is reached, and when the foot goes ahead."""
     foot = s.feet[leg]
     swing, step = foot.swing, foot.step
     a, b, r = swing.start, step.goal, c.foot_radius
-    over = ground_over(m, a, b) + r + OVER_WAY
-    step.top = max(max(a[2], b[2]) + LEAST_TOP, over)
+    step.top = top_of(leg, s, c, m)
     up, down = step.top - a[2], step.top - b[2]
     step.peak = min(max(up / (up + down), 0.3), 0.7)
     length = max(np.hypot(b[0] - a[0], b[1] - a[1]), TIE)
@@ -252,6 +261,9 @@ def swing_by_sight(
             step.goal[:] = step.chosen
         if progress <= SHAPED or is_new:
             shape(leg, s, c, m)
+        elif progress < step.peak:
+            off = top_of(leg, s, c, m) - step.top
+            step.top += min(max(off, -RISE * AGAIN), RISE * AGAIN)
     known = height_at(m, step.chosen[0], step.chosen[1])
     if not np.isnan(known):
         step.chosen[2] = known + c.foot_radius

@@ -57,7 +57,8 @@ def test_the_robot_stops_in_front_of_what_it_cannot_do_and_says_so(
 
 def test_users_look_at_what_was_seen() -> None:
     with GO2Controller(plant=MujocoPlant(terrain=WALL, lidar=True)) as go2:
-        assert go2.terrain is None
+        before = go2.terrain
+        assert before is None
         go2.walk()
         go2.wait(0.5)
         seen = go2.terrain

@@ -103,7 +103,7 @@ class Lidar:
         robot: tuple[mujoco.MjModel, mujoco.MjData],
     ) -> Lidar:
         """That of a robot, in the place that its ``setup`` tells."""
-        config = LidarConfig() if lidar is True else lidar
+        config = lidar if isinstance(lidar, LidarConfig) else LidarConfig()
         return Lidar(config, setup.terrain, robot, np.random.default_rng((setup.seed, config.rays)))
 
     def scan(self, time: float) -> Scan | None:

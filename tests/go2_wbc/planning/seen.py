@@ -27,9 +27,11 @@ def grid(start: float, end: float, aside: float = 0.35) -> np.ndarray:
     return CELL * (np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2) + 0.5)
 
 
-def exact_map(terrain: Terrain | None, start: float = -1.0, end: float = 1.8) -> HeightMap:
+def exact_map(
+    terrain: Terrain | None, start: float = -1.0, end: float = 1.8, aside: float = 0.35
+) -> HeightMap:
     """The map of a terrain on which the robot stands at the origin."""
-    heights, places = HeightMap(), grid(start, end)
+    heights, places = HeightMap(), grid(start, end, aside)
     points = np.column_stack([places, true_heights(terrain, places) - BASE[2]])
     fuse(heights, points, BASE, np.eye(3), 0.001)
     return heights

@@ -39,7 +39,8 @@ def test_a_lidar_changes_nothing_else() -> None:
         MujocoPlant(sensors="imu", seed=3),
         MujocoPlant(sensors="imu", seed=3, lidar=True),
     )
-    scans(blind, 40), scans(seeing, 40)
+    scans(blind, 40)
+    scans(seeing, 40)
     np.testing.assert_array_equal(blind.read().q, seeing.read().q)
 
 
