@@ -170,6 +170,7 @@ class ControlLoop:
             self._look_after_parts()
             self._guard()
             self._feel()
+            self.behaviour.delay = self.latency.delay
             target = self.behaviour.update(self.snapshot)
             self._sag, self._lean = self._sag_and_lean(target)
             self._watch_feet(target)

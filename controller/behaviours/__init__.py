@@ -18,6 +18,7 @@ class Behaviour(ABC):
         may_lie: whether the belly may be on the ground.
         is_dynamic: whether it flies, or stands on few feet.
         knows_payload: whether the robot is taken to carry what was felt, and goes on feeling it.
+        delay: after which commands act [s], as far as that is known.
         sag_and_lean: depth [m] of the trunk below where it shall be and angle [rad] from how it
             shall be, if what is tracked says something else; None if it says so itself.
     """
@@ -29,6 +30,7 @@ class Behaviour(ABC):
     is_dynamic: bool = False
     knows_payload: bool = False
     sag_and_lean: tuple[float, float] | None = None
+    delay: float = 0.0
 
     def start(self, snapshot: Snapshot) -> None:
         """Begin from the measured state."""

@@ -69,7 +69,7 @@ class Walking(Behaviour):
             gait, command = self.choice.update(now, velocity, command)
             if gait != self.gait:
                 self.change_gait(gait)
-        reference = self._planner.update(snapshot, command, self.pose)
+        reference = self._planner.update(snapshot, command, self.pose, self.delay)
         if not self._has_told and self._planner.is_slowed:
             self._has_told = True
             _log.warning("rough ground: %g m/s at most until it is smooth again", self._most)

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from go2_wbc.compilation import subroutine
 from go2_wbc.planning.ground import ground_at
-from go2_wbc.planning.trunk import heading, world_velocity
+from go2_wbc.planning.trunk import Trunk, gained, heading, world_velocity
 from go2_wbc.planning.walk import Planner, Walk
 from go2_wbc.robot.state import Snapshot
 
@@ -34,6 +34,26 @@ def nominal_feet(
         x, y = c.p_base_feet_nominal[leg, 0], width * c.p_base_feet_nominal[leg, 1]
         feet[leg, 0] = now.q[0] + cosine * x - sine * y + now.com_shift[0]
         feet[leg, 1] = now.q[1] + sine * x + cosine * y + now.com_shift[1]
+
+
+@subroutine
+def speeding_up(trunk: Trunk, remaining: float, stance: float, fall: float) -> tuple[float, float]:
+    """How far [m] a foothold lies ahead as the command is ramped, in the world.
+
+    The hip comes by s(t + T / 2) farther until the middle of the stance, and a trunk that speeds up
+    by a needs the force m a, whose moment about the CoM the feet balance (h / g) a behind; ``fall``
+    is h / g [s^2], ``stance`` T [s].
+    """
+    cosine, sine = np.cos(trunk.yaw), np.sin(trunk.yaw)
+    way_x, way_y = 0.0, 0.0
+    for axis in range(2):
+        _, way = gained(trunk, axis, remaining + 0.5 * stance)
+        before, _ = gained(trunk, axis, remaining)
+        after, _ = gained(trunk, axis, remaining + stance)
+        way -= fall * (after - before) / max(stance, _TINY)
+        way_x += way * (cosine if axis == 0 else -sine)
+        way_y += way * (sine if axis == 0 else cosine)
+    return way_x, way_y
 
 
 @subroutine
@@ -67,6 +87,8 @@ def foothold(
     y = sine * hip_x + cosine * hip_y - hip_y + v_y * half
     x += gain * (v_x - ref_x) + lean * ref_y
     y += gain * (v_y - ref_y) - lean * ref_x
+    ahead_x, ahead_y = speeding_up(s.trunk, remaining, 2.0 * half, c.height / c.gravity)
+    x, y = x + ahead_x, y + ahead_y
     share = min(1.0, c.config.foothold_reach / max(np.hypot(x, y), _TINY))
     goal[0] = now.q[0] + hip_x + x * share + v_x * remaining
     goal[1] = now.q[1] + hip_y + y * share + v_y * remaining

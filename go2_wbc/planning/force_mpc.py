@@ -79,7 +79,7 @@ def fill_goals(s: Planner, c: Walk, command: Command) -> None:
     a, b = tilt(s.ground)
     steep = np.hypot(a, b)
     share = np.arctan(steep) / steep if steep > 0.0 else 1.0
-    linear = haste(s.ground, s.slip.friction) * config.linear_acceleration
+    linear = haste(s.ground, s.slip.friction, s.delay) * config.linear_acceleration
     goals[:] = 0.0
     for k in range(NODES):
         ramp(velocity, command, linear, config.angular_acceleration, STEP)
@@ -197,8 +197,12 @@ def fill_arms(now: Snapshot, s: Planner, c: Walk) -> None:
                 hip_x, hip_y = cosine * x - sine * y, sine * x + cosine * y
                 early = duty * period / 2 + wait - (k + 0.5) * STEP
                 v_x, v_y = goals[k, 9] + excess_x * left, goals[k, 10] + excess_y * left
-                arm[0] = base[0] - com[0] + hip_x + (v_x - rate * hip_y) * early
-                arm[1] = base[1] - com[1] + hip_y + (v_y + rate * hip_x) * early
+                last, next = max(k - 1, 0), min(k + 1, NODES - 1)
+                fall = c.height / c.gravity / (STEP * (next - last))
+                lean_x = fall * (goals[next, 9] - goals[last, 9])
+                lean_y = fall * (goals[next, 10] - goals[last, 10])
+                arm[0] = base[0] - com[0] + hip_x + (v_x - rate * hip_y) * early - lean_x
+                arm[1] = base[1] - com[1] + hip_y + (v_y + rate * hip_x) * early - lean_y
                 arm[2] = ground_at(s.ground, com[0] + arm[0], com[1] + arm[1]) - com[2]
 
 

@@ -77,8 +77,12 @@ steep: on stairs every other foot tells it anew, but on a ramp of 22 deg it is o
 and 3 of 10 robots fell behind it that still walked as on stairs."""
 FIRST_WAY = 0.5
 """For how far [m] the first step is taken for a high one."""
-HASTE_FRICTION = 0.4
-"""Friction from which on the ground bears the greatest acceleration."""
+HASTE_FRICTION = 0.45
+"""Friction from which on the ground bears the greatest acceleration; on less it falls with the
+square: what slid once shows less than there is, and goes on at once on ground that has it."""
+PROMPT, LATE, LATE_HASTE = 0.003, 0.008, 0.4
+"""Lateness of the commands [s] up to which the robot speeds up by all that the ground bears, and
+from which on it does by the last share of it."""
 ROUGH_HASTE = 1.0 / 3.0
 """Share of the accelerations that is left there."""
 CALMING = 0.8
@@ -259,9 +263,14 @@ def level_friction(g: Ground, friction: float, least: float) -> float:
 
 
 @subroutine
-def haste(g: Ground, friction: float) -> float:
-    """Share of the greatest acceleration that the ground bears, by its ``friction`` and slope."""
-    share = min(level_friction(g, friction, LEAST_FRICTION) / HASTE_FRICTION, 1.0)
+def haste(g: Ground, friction: float, delay: float) -> float:
+    """Share of the greatest acceleration that the robot is given.
+
+    By the ``friction`` and slope of the ground, and by how late the commands act [s].
+    """
+    share = min(level_friction(g, friction, LEAST_FRICTION) / HASTE_FRICTION, 1.0) ** 2
+    late = min(max((delay - PROMPT) / (LATE - PROMPT), 0.0), 1.0)
+    share = min(share, 1.0 - (1.0 - LATE_HASTE) * late)
     return ROUGH_HASTE * share if is_rough(g) else share
 
 

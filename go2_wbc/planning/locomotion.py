@@ -67,6 +67,7 @@ from go2_wbc.planning.trunk import (
     BodyPose,
     Command,
     Trunk,
+    accelerate,
     advance_pose,
     correct_height,
     fill_body,
@@ -75,7 +76,6 @@ from go2_wbc.planning.trunk import (
     is_settled,
     is_zero,
     level,
-    ramp,
 )
 from go2_wbc.planning.walk import (
     GREATEST_HEIGHT,
@@ -94,6 +94,8 @@ from go2_wbc.robot.state import Snapshot
 
 __all__ = ["GREATEST_HEIGHT", "LEAST_HEIGHT", "LocomotionConfig", "LocomotionPlanner"]
 
+DELAY_STAYS = 10.0
+"""Time [s] for which commands count as late after they were."""
 MID_SWING = 0.2
 """Share of a swing before and after its middle in which a foot that has contact stumbles."""
 
@@ -129,8 +131,8 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
     """Ramp velocity and pose, integrate to the place, apply the leash, correct the height."""
     trunk, config = s.trunk, c.config
     advance_pose(trunk.pose, trunk.pose_rate, config.pose, command.pose, dt)
-    linear = haste(s.ground, s.slip.friction) * config.linear_acceleration
-    ramp(trunk.velocity, command, linear, config.angular_acceleration, dt)
+    linear = haste(s.ground, s.slip.friction, s.delay) * config.linear_acceleration
+    accelerate(trunk, command, linear, config.angular_acceleration, dt)
     follow_heading(trunk, now, config.yaw_leash, dt)
     if s.is_stepping:
         follow_position(trunk, now, config.position_leash, dt)
@@ -387,7 +389,11 @@ class LocomotionPlanner:
 
     @typed(late=True)
     def update(
-        self, snapshot: Snapshot, command: VelocityCommand, pose: BodyPose = LEVEL
+        self,
+        snapshot: Snapshot,
+        command: VelocityCommand,
+        pose: BodyPose = LEVEL,
+        delay: float = 0.0,
     ) -> Reference:
         """The reference of this tick.
 
@@ -395,8 +401,11 @@ class LocomotionPlanner:
             snapshot: of this tick.
             command: wanted velocity, already inside the envelope.
             pose: wanted pose of the trunk, already inside its envelope.
+            delay: after which commands act [s]; they count as that late for some time.
         """
         asked, state, target = self._command, snapshot.state, Target()
+        left = 1.0 - min((state.time - self._state.time) / DELAY_STAYS, 1.0)
+        self._state.delay = max(delay, left * self._state.delay)
         velocity = command.linear_x, command.linear_y, command.angular_z
         asked.row[:] = *velocity, pose.height, pose.roll, pose.pitch, pose.yaw
         contact, tau = state.feet_in_contact, state.tau

@@ -43,7 +43,7 @@ UNEVEN, UNEVEN_WAY = 0.04, 0.4
 remembered."""
 LOOK = 1.1
 """How far ahead [m] uneven ground counts."""
-SPEED, FLIGHT_SPEED = 0.46, 0.32
+SPEED, FLIGHT_SPEED = 0.43, 0.32
 """Greatest speed [m/s] on it, and on a flight of stairs: of"""
 FLIGHT, FLIGHT_STEP = 3, 0.13
 """so many steps in sight, and higher than that [m]."""
@@ -60,8 +60,9 @@ they can be put."""
 STOP, BRAKING = 0.60, 0.5
 """Distance [m] of the CoM from the end of its way at which it has stopped, and the deceleration
 [m/s^2] of what it is told."""
-NEAR_STOP = 0.03
-"""Distance [m] from there at which it counts as stopped."""
+NEAR_STOP, CERTAIN = 0.03, 0.7
+"""Distance [m] from there at which it counts as stopped, and time [s] after which it says so: the
+first step down of a flight is seen later than the second."""
 RISE, DROP = 1.0, 2.0
 """What ends a way: a step up or a wall, or a gap or a step down."""
 _TINY = 1e-9
@@ -76,6 +77,7 @@ class Sight(Record):
         lift: height [m] by which the trunk is carried higher.
         blocked: what ends the way ahead, 0 for nothing.
         end: how far ahead [m] of the CoM that is.
+        stopped: for how long [s] it has been so near that the robot has stopped.
         is_slowed: whether the robot is told less than it was asked for.
     """
 
@@ -84,12 +86,13 @@ class Sight(Record):
     lift: float
     blocked: float
     end: float
+    stopped: float
     is_slowed: bool
 
     @property
     def why_blocked(self) -> str:
         """What the robot stands in front of, in plain words; "" if it may go on."""
-        if self.blocked == 0.0 or self.end > STOP + NEAR_STOP:
+        if self.stopped < CERTAIN:
             return ""
         drop = f"a gap of more than {GREATEST_GAP:g} m or a step down of more than"
         what = "a wall or a step up of more than" if self.blocked == RISE else drop
@@ -257,6 +260,8 @@ def look(
     lift = LIFT if climb < -LOWERED and sight.uneven_way > 0.0 else 0.0
     sight.lift += min(max(lift - sight.lift, -LIFT_RATE * dt), LIFT_RATE * dt)
     sight.blocked, sight.end = way_ahead(m, x, y, way, plane[0])
+    is_near = sight.blocked != 0.0 and sight.end < STOP + NEAR_STOP
+    sight.stopped = sight.stopped + dt if is_near else 0.0
     most = SPEED if sight.uneven_way > 0.0 else np.inf
     if steps >= FLIGHT and highest > FLIGHT_STEP:
         most = FLIGHT_SPEED

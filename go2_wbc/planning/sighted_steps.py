@@ -7,10 +7,10 @@ distance d, that costs least:
         + MISS sum of how far, at touchdown, in the middle and at the end of its stance, the calf
         comes below CLEARANCE over the ground, and the hip out of reach
 
-``edge`` falls from 1 at ``NEAR`` to 0 at ``NEAR_ENOUGH`` from the next cell that is higher or lower
-by more than ``STEP``, or unknown; ``range`` is that of the heights of the cells around it. It is
-chosen anew until ``LATEST`` of the swing, and gone over to at ``SLEW``; later only its height
-follows.
+``edge`` falls, as a square, from 1 at ``NEAR`` to 0 at ``NEAR_ENOUGH`` from the next cell that is
+lower by more than ``STEP``, or unknown, or a little nearer if it is higher; ``range`` is that of
+the heights of the cells around it. It is chosen anew until ``LATEST`` of the swing, and gone over
+to at ``SLEW``; later only its height follows.
 
 The swing goes up to a top over both of its ends and all that is between, and down; each part's time
 is by its height. It goes ahead between two moments, which are the nearest to the swing's begin and
@@ -37,8 +37,9 @@ ALONG, ACROSS = 7, 3
 FAR, FLAT, MISS = 0.06, 0.02, 150.0
 """Distance [m] and range of heights [m] that cost 1, and what a metre of missing room costs."""
 EDGE, UNKNOWN, STICKY = 10.0, 15.0, 0.5
-NEAR, NEAR_ENOUGH, STEP = 0.036, 0.062, 0.035
-"""Distances [m] of an edge, and its height [m]."""
+NEAR, NEAR_ENOUGH, STEP, HIGHER = 0.036, 0.085, 0.035, 0.015
+"""Distances [m] of an edge, its height [m], and by how much nearer [m] one may be that is
+higher."""
 CLEARANCE, SHORTEST, LONGEST = 0.035, 0.14, 0.39
 """Height [m] of the calf's axis over the ground, and lengths [m] from hip to foot."""
 LATEST, SLEW, AGAIN = 0.6, 2.5, 0.01
@@ -61,20 +62,20 @@ LANDS = 0.03
 def edge_cost(m: HeightMap, x: float, y: float, z: float) -> tuple[float, float]:
     """How near an edge is, 0 to 1, and the range [m] of the heights around."""
     nearest, low, high = NEAR_ENOUGH, z, z
-    for i in range(-2, 3):
-        for j in range(-2, 3):
-            if i == 0 and j == 0:
-                continue
+    for i in range(-3, 4):
+        for j in range(-3, 4):
             far = CELL * np.sqrt(i * i + j * j)
             if far >= nearest:
                 continue
             beside = height_at(m, x + i * CELL, y + j * CELL)
-            if np.isnan(beside) or abs(beside - z) > STEP:
+            if beside > z + STEP:
+                nearest = min(nearest, far + HIGHER)
+            elif not beside >= z - STEP:  # lower, or unknown
                 nearest = far
             elif abs(i) <= 1 and abs(j) <= 1:
                 low, high = min(low, beside), max(high, beside)
     near = min((NEAR_ENOUGH - nearest) / (NEAR_ENOUGH - NEAR), 1.0)
-    return near, high - low
+    return near * near, high - low
 
 
 @subroutine

@@ -50,6 +50,8 @@ ANGLE_LIMIT, ANGLE_WINDOW = 0.3, 0.3
 """The same of the attitude [rad]. A load of 4 kg, 5 cm beside the middle of the simulated robot,
 leaned it by 15 deg where errors beyond 0.1 rad were dropped, by 9 with a limit of 0.15 rad, by 2
 with these."""
+EAGERNESS = 0.05
+"""Time [s] within which footholds are moved for an acceleration that has just begun."""
 SETTLED_COMMAND = 1e-3
 """Ramped velocity command [m/s, rad/s] below which it counts as arrived at zero."""
 STRIDE_RATE, STRIDE_WINDOW = 1.0, 0.05
@@ -59,6 +61,8 @@ stands ready does it as a motion does: the joints' friction leaves 2.5 deg of a 
 payload that reaches farther than is believed leans it by 4 deg."""
 LEAN_LIMIT = 0.15
 """Greatest lean [rad] that is taken out."""
+_TINY = 1e-9
+"""Velocity [m/s] that stands in for none where one divides by it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,6 +225,8 @@ class Trunk(Record):
         yaw: heading [rad].
         position: of the CoM, on the level [m].
         velocity: ramped command in the heading frame [m/s], [rad/s].
+        missing: what of the command ahead and to the left has yet to be ramped [m/s].
+        acceleration: at which that happens, smoothed, in the heading frame [m/s^2].
         height_offset: what is added to the wanted height against a load [m].
         lean_offset: turn about x and y of the world [rad] that is added against the lean.
         pose: on top of walking level: height [m], roll, pitch, yaw [rad].
@@ -230,6 +236,8 @@ class Trunk(Record):
     yaw: float
     position: Float[np.ndarray, "2"]
     velocity: Array3
+    missing: Float[np.ndarray, "2"]
+    acceleration: Float[np.ndarray, "2"]
     height_offset: float
     lean_offset: Float[np.ndarray, "2"]
     pose: Array4
@@ -268,9 +276,34 @@ def world_velocity(trunk: Trunk) -> tuple[float, float]:
 @subroutine
 def ramp(velocity: Array3, command: Command, linear: float, angular: float, dt: float) -> None:
     """Bring a velocity nearer to the commanded one, by these accelerations [m/s^2], [rad/s^2]."""
-    for i in range(3):
-        most = (angular if i == 2 else linear) * dt
-        velocity[i] += min(max(command.velocity[i] - velocity[i], -most), most)
+    x, y = command.velocity[0] - velocity[0], command.velocity[1] - velocity[1]
+    share = min(linear * dt / max(np.hypot(x, y), _TINY), 1.0)
+    velocity[0] += share * x
+    velocity[1] += share * y
+    most = angular * dt
+    velocity[2] += min(max(command.velocity[2] - velocity[2], -most), most)
+
+
+@subroutine
+def accelerate(trunk: Trunk, command: Command, linear: float, angular: float, dt: float) -> None:
+    """Bring the trunk's velocity nearer to the commanded one; ``linear`` [m/s^2], ``angular``."""
+    ramp(trunk.velocity, command, linear, angular, dt)
+    for i in range(2):
+        trunk.missing[i] = command.velocity[i] - trunk.velocity[i]
+    share = linear / max(np.hypot(trunk.missing[0], trunk.missing[1]), _TINY)
+    for i in range(2):
+        rise = share * trunk.missing[i] - trunk.acceleration[i]
+        trunk.acceleration[i] += min(dt / EAGERNESS, 1.0) * rise
+
+
+@subroutine
+def gained(trunk: Trunk, axis: int, time: float) -> tuple[float, float]:
+    """Velocity [m/s] that the ramp adds along an axis within a ``time`` [s], and the way [m]."""
+    missing, a = trunk.missing[axis], trunk.acceleration[axis]
+    if missing * a <= 0.0:
+        return 0.0, 0.0
+    lasts = min(missing / a, time)
+    return a * lasts, a * lasts * (time - 0.5 * lasts)
 
 
 @subroutine

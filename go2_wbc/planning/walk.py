@@ -65,9 +65,8 @@ class LocomotionConfig:
         height: CoM height [m] above the ground.
         compression: by which feet under the trunk's weight are pressed flat, or into the ground,
             [m]: in MuJoCo 1 to 6 mm, by the friction of the joints.
-        linear_acceleration: greatest change of the commanded velocity [m/s^2] on a friction of
-            0.4 and more; on less it is as much less (``ground.haste``). By 3 and more robots that
-            turned round at 2 m/s fell on their own sensors.
+        linear_acceleration: greatest change of the commanded velocity [m/s^2], where the ground
+            bears it and the commands act at once; else as much less as ``ground.haste`` says.
         angular_acceleration: greatest change of the commanded turning rate [rad/s^2].
         velocity_feedback: foothold offset [s] per velocity error.
         stride_margin: speed [m/s] that the robot may have beyond the commanded one before the
@@ -93,7 +92,7 @@ class LocomotionConfig:
 
     height: float = 0.29
     compression: float = 0.004
-    linear_acceleration: float = 2.5
+    linear_acceleration: float = 6.0
     angular_acceleration: float = 4.0
     velocity_feedback: float = 0.12
     stride_margin: float = 0.4
@@ -216,11 +215,13 @@ class Planner(Record):
     Attributes:
         time: of the last tick [s].
         is_stepping: whether the gait is running.
+        delay: after which commands act [s].
         horizon: what the MPC has looked at last.
     """
 
     time: float
     is_stepping: bool
+    delay: float
     clock: Clock
     trunk: Trunk
     ground: Ground

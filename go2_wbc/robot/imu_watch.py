@@ -39,12 +39,14 @@ FOUND_AFTER, FOUND_SHARE = 0.2, 0.8
 it that the sums have taken in by then: 1 - exp(-0.16 / 0.1)."""
 REFINING = 0.2
 """Time [s] over which what is left of it is measured then: both pairs of a trot's feet stand."""
-EXPLAINED, UNEXPLAINED = 0.3, 0.3
+EXPLAINED, UNEXPLAINED = 0.5, 0.3
 """Share of the feet's squared residual that an error of the gyro explains, if it is one, and what
 else they may turn by [rad/s]: one that lies down on slippery ground slides by 0.46."""
 JUMP, SEEN, JUMP_LASTS, LONGEST_JUMP = 0.3, 0.4, 0.03, 0.25
 """Change of the gyro from one reading to the next [rad/s] that may be an error; what feet that do
 not jump along have to show of it [m^2/s^2], for how long at least [s], and at most."""
+GOES_ON = 0.25
+"""Share of it by which the next reading changes alike, if what has changed is the turning."""
 JUMP_SHARE, NO_JUMP, JUMP_EXPLAINED = (0.7, 1.4), 0.5, 0.85
 """Range of the share of the jump that they lack, if it is an error; share below which it is none;
 and the share of their squared residual that an error explains: 0.97 of most, a slip 0.8."""
@@ -188,8 +190,11 @@ def gyro_error(m: WatchedImu) -> V3:
 
 
 @subroutine
-def judge_gyro(m: WatchedImu, dt: float) -> None:
-    """Name it once its error has lasted, and take the error off; and once more what is left."""
+def judge_gyro(m: WatchedImu, stands: bool, dt: float) -> None:
+    """Name it once its error has lasted, and take the error off; and once more what is left.
+
+    No time passes while there are not two feet that tell: the same pair has not told it twice.
+    """
     error = gyro_error(m)
     if m.refining > 0.0:
         m.refining -= dt
@@ -200,7 +205,7 @@ def judge_gyro(m: WatchedImu, dt: float) -> None:
     most = UNEXPLAINED**2 * (m.turning[0, 0] + m.turning[1, 1] + m.turning[2, 2])
     is_off = explained > max(EXPLAINED * m.residual, m.residual - most)
     is_off = is_off and dot(error, error) > GYRO_LIMIT**2
-    m.gyro_time = m.gyro_time + dt if is_off else 0.0
+    m.gyro_time = m.gyro_time + (dt if stands else 0.0) if is_off else 0.0
     if m.gyro_time > GYRO_LASTS:
         m.gyro_is_off, m.refining = 1.0, REFINING
         share = 1.0 / FOUND_SHARE
@@ -211,8 +216,13 @@ def judge_gyro(m: WatchedImu, dt: float) -> None:
 def judge_jump(m: WatchedImu, change: V3, dt: float) -> None:
     """Take off what the gyro has jumped by since the last reading if the feet lack it for a while.
 
-    With f and e of each pair the share that they lack is sum f . e / sum f . f, least squares.
+    With f and e of each pair the share that they lack is sum f . e / sum f . f, least squares. What
+    a landing turns goes on to turn in the next reading.
     """
+    if m.jump_time == dt and dot(change, triple(m.jump)) > GOES_ON * dot(
+        triple(m.jump), triple(m.jump)
+    ):
+        m.jump_time = 0.0
     if m.jump_time > 0.0:
         m.jump_time += dt
         is_told = m.jump_seen > SEEN and m.jump_time > JUMP_LASTS

@@ -56,6 +56,9 @@ SMOOTHING = 0.008
 LOADED, FREE = 20.0, 10.0
 """Force [N] by a leg's torques above which its foot stands, and below which it does not: of those
 that swing in a trot 99 % seem to bear less than 7 N."""
+LANDED = 0.03
+"""Time [s] for which a foot has stood that tells of the IMU: one that comes down hard slides and is
+pressed flat. In 9 minutes of reversals of 2 m/s a sound IMU was named 7 times without."""
 UNFELT, SENSED = 3.0, 25.0
 """Force [N] below which a sensor says that the foot is free, and above which it says it stands."""
 FORCE_TIME, SAME_TIME = 0.12, 0.25
@@ -90,6 +93,7 @@ class WatchedSensors(Record):
         noise: of it, while it is free and while it stands; see ``NOISY`` [N].
         force_same: for how long it has been the very same [s].
         load: of the leg, when that began [N].
+        stood: for how long a foot has borne its leg's load [s].
         against: for how long a foot's force has contradicted the leg's torques [s].
         gyro, accelerometer: the last, as they were read.
         imu: the IMU against feet that stand.
@@ -110,6 +114,7 @@ class WatchedSensors(Record):
     noise: Float[np.ndarray, "2 4"]
     force_same: Array4
     load: Array4
+    stood: Array4
     against: Array4
     gyro: Array3
     accelerometer: Array3
@@ -316,7 +321,9 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
     for leg in range(4):
         watch_force(s, r, leg, borne[leg], slack[leg], is_borne, dt)
         stands = r.foot_forces[leg] > SENSED or borne[leg] - slack[leg] > LOADED
-        is_used = stands and borne[leg] > LOADED and m.unborne == 0.0 and is_sound(s, leg)
+        bears = stands and borne[leg] > LOADED and is_sound(s, leg)
+        s.stood[leg] = s.stood[leg] + dt if bears else 0.0
+        is_used = s.stood[leg] > LANDED and m.unborne == 0.0
         loads[leg] = borne[leg] if is_used else 0.0
     m.is_found, m.turn[:] = 0.0, 0.0
     judge_jump(m, jump, dt)
@@ -346,8 +353,8 @@ def watch_imu(
                     between = plus_scaled(triple(places[one]), -1.0, triple(places[other]))
                     apart = plus_scaled(triple(speeds[one]), -1.0, triple(speeds[other]))
                     note_turn(m, between, apart, w)
-    judge_gyro(m, dt)
     stands = bool(np.sum(loads > 0.0) > 1)  # one foot may roll or slip
+    judge_gyro(m, stands, dt)
     judge_accelerometer(m, triple(r.accelerometer), w, v, up, c.gravity, stands, dt)
     s.gyro_is_off, s.accelerometer_is_off = m.gyro_is_off, m.force_is_off
 

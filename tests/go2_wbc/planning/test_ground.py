@@ -12,10 +12,13 @@ from go2_wbc.planning.ground import (
     FRICTION_RISE,
     HALF_SPEED,
     HASTE_FRICTION,
+    LATE,
+    LATE_HASTE,
     LEAST_FRICTION,
     MOST_FRICTION,
     MOST_RAISE,
     MOST_SLOPE,
+    PROMPT,
     ROUGH,
     ROUGH_HASTE,
     SLIP_SPEED,
@@ -127,13 +130,14 @@ def test_the_robot_goes_slowly_on_rough_ground_and_for_a_way_after_it() -> None:
     assert not is_rough(ground)
 
 
-def test_the_robot_speeds_up_as_the_ground_bears_it() -> None:
+def test_the_robot_speeds_up_as_ground_and_motors_bear_it() -> None:
     level, slope = plane(on_plane(np.zeros(2))), plane(on_plane(SLOPE))
-    assert haste(level, MOST_FRICTION) == 1.0
-    assert haste(level, 0.5 * HASTE_FRICTION) == pytest.approx(0.5)
-    assert haste(slope, HASTE_FRICTION) < 1.0
+    assert haste(level, MOST_FRICTION, PROMPT) == 1.0
+    assert haste(level, MOST_FRICTION, 2.0 * LATE) == pytest.approx(LATE_HASTE)
+    assert haste(level, 0.5 * HASTE_FRICTION, LATE) == pytest.approx(0.25)
+    assert haste(slope, HASTE_FRICTION, 0.0) < 1.0
     level.rough_way = 0.1
-    assert haste(level, MOST_FRICTION) == pytest.approx(ROUGH_HASTE)
+    assert haste(level, MOST_FRICTION, 0.0) == pytest.approx(ROUGH_HASTE)
 
 
 @pytest.mark.parametrize("friction", [0.3, 0.6])

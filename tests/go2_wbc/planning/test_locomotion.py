@@ -8,7 +8,7 @@ import pytest
 
 from go2_wbc.contacts import GAITS, Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
-from go2_wbc.planning.ground import GROUND_SHARE
+from go2_wbc.planning.ground import GROUND_SHARE, MOST_FRICTION
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.rotations import log_rotation, yaw_rotation
@@ -127,14 +127,17 @@ def test_squaring_up_steps_unless_the_feet_are_below_the_hips() -> None:
 
 
 def test_the_reference_velocity_ramps_to_the_command_at_the_allowed_rate() -> None:
+    """Along a straight line: on the ground all directions are alike."""
     planner, command = started(resting()), VelocityCommand(0.6, -0.3, 1.0)
-    rate = np.array([CONFIG.linear_acceleration] * 2 + [CONFIG.angular_acceleration])
     wanted, previous = np.array([0.6, -0.3, 1.0]), np.zeros(3)
     for tick in range(1, 301):
         body = planner.update(resting(tick * TICK), command).body
         v_body = body.R_world_base.T @ body.v_world
         velocity = np.array([*v_body[:2], body.w_world[2]])
-        assert (np.abs(velocity - previous) <= rate * TICK + EXACT).all()
+        change = np.abs(velocity - previous) / TICK
+        assert np.hypot(*change[:2]) <= CONFIG.linear_acceleration + EXACT
+        assert change[2] <= CONFIG.angular_acceleration + EXACT
+        assert velocity[0] == pytest.approx(-2.0 * velocity[1], abs=EXACT)
         previous = velocity
     np.testing.assert_allclose(previous, wanted, atol=EXACT)
 
@@ -211,6 +214,19 @@ def test_the_foothold_is_half_the_stance_travel_ahead_corrected_by_the_velocity_
     np.testing.assert_allclose(found[:, :2], np.tile(expected[:2], (2, 1)), atol=LAST_TICK)
     depth = CONFIG.swing.touchdown_depth
     np.testing.assert_allclose(found[:, 2], -depth, atol=LAST_TICK)
+
+
+def test_a_robot_that_speeds_up_puts_its_feet_behind_its_hips() -> None:
+    """A force m (a, g) through the CoM, h above the ground, comes from h a / g behind it."""
+    start = resting()
+    planner = LocomotionPlanner(MODEL, TROT, replace(CONFIG, linear_acceleration=3.0))
+    planner.start(start, MOST_FRICTION)
+    reference = hold(planner, start, VelocityCommand(2.0), SWING_END)
+    half, v_ref = TROT.stance_time / 2, reference.body.v_world[0]
+    way = 3.0 * half**2 / 2 - 3.0 * CONFIG.height / MODEL.gravity
+    swing = ~reference.stance
+    found = (reference.p_world_feet[swing] - start.p_world_feet[swing])[:, 0]
+    np.testing.assert_allclose(found, way - CONFIG.velocity_feedback * v_ref, atol=0.01)
 
 
 @pytest.mark.parametrize(("ahead", "left"), [(0.0, 0.0), (0.2, 0.1)])

@@ -101,7 +101,7 @@ def test_the_trunk_follows_a_slope_before_a_foot_has_met_it(angle: float) -> Non
 )
 def test_the_speed_is_what_the_ground_ahead_permits(terrain: Terrain | None, most: float) -> None:
     walking, command = planner(exact_map(terrain)), VelocityCommand(0.8)
-    for n in range(1, 400):
+    for n in range(1, 600):
         state = state_of(standing_q(), time=0.002 * n)
         walking.update(MODEL.snapshot(state), command)
     assert walking.velocity[0] == pytest.approx(most, abs=0.06)

@@ -171,7 +171,7 @@ def test_a_foot_that_stumbles_begins_anew_where_it_is_and_leaves_the_other_swing
     np.testing.assert_allclose(stumbling[a_while].p_world_feet[0, 0], start.p_world_feet[0, 0])
     assert stumbling[a_while].p_world_feet[0, 2] > start.p_world_feet[0, 2] + 0.01
     ends = [run[-1].p_world_feet[0] for run in (calm, stumbling)]
-    np.testing.assert_allclose(*ends, atol=2e-2)  # but for the last tick, and a nearer goal
+    np.testing.assert_allclose(*ends, atol=3e-2)  # but for the last tick, and a slower ramp
 
 
 @dataclass

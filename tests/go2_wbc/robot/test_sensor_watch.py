@@ -211,6 +211,17 @@ def test_a_gyro_that_jumps_is_named_and_its_error_taken_off(axis: int) -> None:
     assert last.gyro == pytest.approx(np.zeros(3), abs=0.02)
 
 
+@pytest.mark.parametrize(("next_turn", "named"), [(0.4, ["gyro"]), (0.55, [])])
+def test_a_landing_turns_a_robot_on_and_an_error_comes_at_once(
+    next_turn: float, named: list[str]
+) -> None:
+    """The feet slide as it lands and do not tell; either is there for 80 ms."""
+    turns = np.zeros((290, 3))
+    turns[250], turns[251:] = [0.4, 0.0, 0.0], [next_turn, 0.0, 0.0]
+    _, faults = watched(*(reading(k, gyro=w) for k, w in enumerate(turns)))
+    assert [fault.part for fault in faults] == named
+
+
 def test_a_gyro_that_drifts_off_is_named_too() -> None:
     drift = np.array([0.0, 0.5, 0.0])
     share = [min(max(k - 100, 0) / 50.0, 1.0) for k in range(500)]
