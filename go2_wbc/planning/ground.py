@@ -128,6 +128,8 @@ class RoughConfig:
             0.5 m/s 6. Of the first step it is not known yet, so it is taken for one.
         way: for how far [m] either is remembered.
         raised: least height [m] by which a swing is higher.
+        first_raised: the same as long as the ground has no slope: a foot that meets the first step
+            does not tell how high it is, and the next one must not meet it as well.
         swing: time [s] by which it is longer.
         stance: longest time [s] that a foot stands, if that is not shorter already.
         leash: greatest distance [m] of the height that is asked of the CoM from that it has. A foot
@@ -145,6 +147,7 @@ class RoughConfig:
     high_speed: float = 0.43
     way: float = 1.7
     raised: float = 0.05
+    first_raised: float = 0.08
     swing: float = 0.02
     stance: float = 0.16
     leash: float = 0.04
@@ -213,7 +216,7 @@ def slow_down(g: Ground, c: RoughConfig, velocity: Array3) -> None:
 
 @subroutine
 def on_leash(g: Ground, c: RoughConfig, height: float, now: Snapshot) -> float:
-    """Height [m] that may be asked of the CoM, where ``height`` is wanted."""
+    """Height [m] asked of the CoM, where on smooth ground it were ``height``."""
     if not is_rough(g):
         return height
     z = now.p_world_com[2]
@@ -229,7 +232,10 @@ def raised(g: Ground) -> float:
 @subroutine
 def apex_raise(g: Ground, c: RoughConfig) -> float:
     """Height [m] by which a swing is higher than on smooth ground."""
-    return max(raised(g), c.raised) if is_rough(g) else raised(g)
+    if not is_rough(g):
+        return raised(g)
+    level = max(1.0 - np.hypot(g.slope[0], g.slope[1]) / STEEP, 0.0)
+    return max(raised(g), c.raised + level * (c.first_raised - c.raised))
 
 
 @subroutine

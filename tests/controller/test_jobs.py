@@ -15,6 +15,8 @@ from go2_wbc.robot.state import RobotState
 from tests.controller.plants import HANG_GUARD, in_thread, lying_state
 
 PATIENCE = 0.8
+LOOKS = 5000
+"""How often, a millisecond apart, a test looks whether a job is prepared."""
 A_WHILE = 0.2
 """Time [s] in which a thread that spins is seen to."""
 
@@ -322,8 +324,11 @@ def test_going_limp_during_the_preparation_keeps_the_job_from_beginning(
 def worked_off(client: Client) -> None:
     """Carry out the job, which a thread prepares, when that is done."""
     polled = threading.Event()
-    while not client.jobs.work():
+    for _ in range(LOOKS):
+        if client.jobs.work():
+            return
         polled.wait(0.001)
+    raise AssertionError("the job was prepared and not carried out")
 
 
 # --- calling off --------------------------------------------------------------------------------
