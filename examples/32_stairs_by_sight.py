@@ -15,17 +15,9 @@ with GO2Controller(plant=MujocoPlant(terrain=stairs, lidar=True, sensors="imu"))
     go2.move(linear_x=0.3)
     go2.wait(8.5)
     go2.stop()
-<<<<<<< HEAD
-    seen = go2.terrain
-    if seen is None:
-        raise SystemExit("the robot has seen nothing")
-    print("at last:", seen)
-    rise = seen.height(*go2.state.p_world_base[:2]) - seen.height(0.3, 0.0)
-=======
     seen, (x, y, _) = go2.terrain, go2.state.p_world_base
     print("at last:", seen)
     rise = 0.0 if seen is None else seen.height(x, y) - seen.height(0.3, 0.0)
->>>>>>> sight
     print(f"climbed {100 * rise:.0f} cm in three steps of 16")
     climbs = go2.mode.value == "walking" and rise > 0.44
 

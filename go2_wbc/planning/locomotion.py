@@ -94,6 +94,7 @@ from go2_wbc.robot.state import Snapshot
 
 __all__ = ["GREATEST_HEIGHT", "LEAST_HEIGHT", "LocomotionConfig", "LocomotionPlanner"]
 
+LONGEST_DELAY = 1.0  # of commands [s]
 DELAY_STAYS = 10.0
 """Time [s] for which commands count as late after they were."""
 MID_SWING = 0.2
@@ -402,7 +403,12 @@ class LocomotionPlanner:
             command: wanted velocity, already inside the envelope.
             pose: wanted pose of the trunk, already inside its envelope.
             delay: after which commands act [s]; they count as that late for some time.
+
+        Raises:
+            CommandError: for a delay that cannot be.
         """
+        if not 0.0 <= delay <= LONGEST_DELAY:
+            raise CommandError(f"delay must be 0 to {LONGEST_DELAY:g} s, got {delay}")
         asked, state, target = self._command, snapshot.state, Target()
         left = 1.0 - min((state.time - self._state.time) / DELAY_STAYS, 1.0)
         self._state.delay = max(delay, left * self._state.delay)
