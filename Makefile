@@ -4,7 +4,7 @@
 SHELL := bash
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-ros2 test-unitree test-cluster test-dist gates format docs bench doctor clean
+.PHONY: help demo test test-ros2 test-unitree test-cluster test-dist test-users gates format docs bench doctor clean
 
 # A shell that has sourced another robot stack would put its own Pinocchio before ours.
 unexport PYTHONPATH
@@ -59,6 +59,9 @@ test-cluster: $(VENV)/.stamp-cluster ## the tests of sweeps, on a Ray cluster of
 
 test-dist: $(VENV)/.stamp-dev ## build wheel and sdist, use each in an empty environment
 	tests/distribution.sh $(BIN)/python
+
+test-users: $(VENV)/.stamp-dev ## what users are shown, after make demo alone and on the wheel: before a release
+	tests/users.sh $(BIN)/python
 
 gates: $(VENV)/.stamp-dev ## lint, formatting, types, who imports whom
 	$(BIN)/ruff check .

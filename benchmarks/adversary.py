@@ -18,8 +18,7 @@ from benchmarks.adversary_motions import COUNT, FAMILIES, Numbers
 from benchmarks.command import Benchmark
 from benchmarks.study import Study, TrialResult
 from benchmarks.validation_set.physics import play
-from controller.motion_failures import failures_of, shares_of
-from controller.motion_measurement import MotionMeasurement
+from controller.motion_measurement import MotionMeasurement, failures_of, shares_of
 from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.errors import MotionError
 from go2_wbc.motion_plan import MotionPlan
@@ -144,7 +143,7 @@ def outcome(plan: MotionPlan, seed: int = 0) -> tuple[tuple[str, ...], float]:
         run = play(plan, checker().model, seed)
     except TrialFailed as error:
         return (str(error),), FAILED
-    return failures_of(run, plan).strict, _worst(run, plan)
+    return failures_of(run, plan), _worst(run, plan)
 
 
 def _worst(run: MotionMeasurement, plan: MotionPlan) -> float:

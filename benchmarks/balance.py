@@ -26,7 +26,7 @@ from benchmarks.command import Benchmark
 from benchmarks.qp_infeasibility import commanded
 from benchmarks.robots import PUSH_TIME, UNTOLD, heading_force, plant_of
 from benchmarks.study import Study, TrialResult
-from controller.checks import is_standing
+from controller.modes import is_standing
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityEnvelope

@@ -17,7 +17,7 @@ from benchmarks.adversary_motions import COUNT, FAMILIES, Numbers
 from benchmarks.command import add_sweep, positive, publish, run_sweep
 from benchmarks.probability_fit import calibration
 from controller.cli.common import ExitCode, Subparsers, add_parser
-from controller.sweeps.rows import Row
+from controller.sweeps.sweep_file import Row
 from go2_wbc.errors import MotionError
 from go2_wbc.motion_plan import MotionPlan
 

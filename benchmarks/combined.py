@@ -36,7 +36,7 @@ from go2_wbc.plant.terrain import Boxes
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion
 
-FIRST_SEED = 1000
+FIRST_SEED = 1100
 """Seed of the first trial that is judged."""
 SPEEDS, TIMES = (0.3, 0.5, 0.8, 1.2), (2.0, 5.0, 8.0, 12.0)
 """m/s and s."""

@@ -17,7 +17,7 @@ from controller.motion_measurement import during_motion
 from controller.sweeps.trials import Trial, TrialRobot
 from motions import FeasibilityChecker
 from motions.music import Beats, Song, beats, click_track, danced, feasible_dance, made_song
-from motions.music.dance_timing import ON_THE_BEAT
+from motions.music.choreography import ON_THE_BEAT
 
 SECONDS = 30.0  # Length [s] of a song
 TEMPI = (62.0, 178.0)  # Tempi [beats/min] that are drawn

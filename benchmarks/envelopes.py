@@ -21,7 +21,7 @@ from benchmarks.command import add_sweep, publish, run_sweep
 from benchmarks.robots import UNTOLD, plant_of
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.motion_measurement import FULL
-from controller.sweeps.rows import Row
+from controller.sweeps.sweep_file import Row
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS

@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.figures import SpeedLine, SpeedPanel, speed_figure
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output
-from viz.render.evidence_plot import SpeedLine, SpeedPanel, speed_figure
 from viz.style import ACCENT, MUTED, PLOT_SUFFIXES, TIGHT, save_figure
 
 MARK, END = "<!-- evidence:", "<!-- evidence:end -->"

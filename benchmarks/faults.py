@@ -31,13 +31,14 @@ from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant.faults import AXES
-from go2_wbc.plant.mujoco.ground_truth import FALLEN_TILT, TOUCH, true_runs
+from go2_wbc.plant.mujoco.ground_truth import FALLEN_TILT, TOUCH
+from go2_wbc.recording import true_runs
 from go2_wbc.robot.profile import GO2
 from motions import load_motion
 
-FIRST_SEED = 9800
+FIRST_SEED = 10100
 """Seed of the first trial that is judged."""
-STATES = ("standing", "trotting", "three-legs")
+STATES, PAW = ("standing", "trotting", "three-legs"), "FR_foot"
 NAMED_WITHIN = 0.5  # [s]
 SPEED = 0.5  # [m/s]
 BEFORE, WATCHED = (1.0, 2.0), 4.0
@@ -124,10 +125,12 @@ def measure_break(trial: Trial, found: TrialResult, what: Break) -> None:
                 robot.plant.fault(what.kind, part=part, at=at, value=what.value)
             values = _lived_through(robot, state, at)
             health, reason = robot.go2.health, robot.go2.last_outcome.reason
-        names = {what.named.format(part) for part in parts}
+        broken = {what.named.format(part) for part in parts}
         told = reversed(health.faults)  # of a part that is named twice, when it first was
-        times = {fault.part: fault.since - at for fault in told if fault.part in names}
-        values["named"] = len(times) == len(names) and max(times.values()) <= NAMED_WITHIN
+        times = {fault.part: fault.since - at for fault in told if fault.part in broken}
+        if what.at_once and state == "three-legs":  # a dead sensor is right of a paw in the air
+            broken.discard(what.named.format(PAW))
+        values["named"] = max(times.get(part, math.inf) for part in broken) <= NAMED_WITHIN
         values["others"] = len(health.faults) - len(times)
         found.notes[state] = f"{', '.join(parts)} at {at:.2f} s: {health}; {reason}"
         found.values |= {f"{state}-{name}": float(value) for name, value in values.items()}

@@ -18,9 +18,14 @@ from benchmarks.validation_set.physics import (
     BORDER,
     BORDERS,
     BORDERS_FILE,
+    LENIENT,
+    STOPS,
+    STRICT,
+    MotionFailures,
     borders_version,
     play,
     read_borders,
+    verdicts_of,
     write_borders,
 )
 from benchmarks.validation_set.questions import (
@@ -32,7 +37,7 @@ from benchmarks.validation_set.questions import (
 )
 from benchmarks.validation_set.scores import HALVES, Case, render, scores, wrong_ones
 from controller.cli.common import ExitCode, Subparsers, add_parser
-from controller.motion_failures import FELL, LENIENT, STOPS, STRICT, MotionFailures, failures_of
+from controller.motion_measurement import FELL
 from controller.sweeps.trials import Trial
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker
@@ -129,7 +134,7 @@ def ask(trial: Trial, found: TrialResult, of: str) -> None:
     question, checker = QUESTIONS[of]()[trial.seed], _checker()
     plan = question.plan(checker.model)
     report = checker.check(plan)
-    outcome = failures_of(play(plan, checker.model, question.draw, trial.sensors), plan)
+    outcome = verdicts_of(play(plan, checker.model, question.draw, trial.sensors), plan)
     refusal = tuple(dict.fromkeys(finding.check for finding in report.failures))
     reasons = {REFUSED: refusal, **{kind: outcome.by(kind) for kind in OUTCOMES}}
     found.values = {row: float(bool(reason)) for row, reason in reasons.items()}

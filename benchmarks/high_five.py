@@ -13,7 +13,8 @@ from benchmarks.study import Rows, Study, TrialResult
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.geometry import moving_support_margins
 from go2_wbc.legs import LEGS, SIDES, Leg
-from go2_wbc.plant.mujoco.ground_truth import TruthRecording, true_runs
+from go2_wbc.plant.mujoco.ground_truth import TruthRecording
+from go2_wbc.recording import true_runs
 from go2_wbc.robot.model import RobotModel
 
 HOLD = 2.0  # Time [s] for which the paw is asked to be held

@@ -38,8 +38,7 @@ from benchmarks.robots import FRICTION_RANGE, UNTOLD, plant_of
 from benchmarks.study import IMU, Study, TrialResult
 from benchmarks.unknown_world import STUDIES as UNKNOWN
 from controller.motion_measurement import FULL
-from controller.sweeps.studies import set_off
-from controller.sweeps.trials import Trial, TrialRobot
+from controller.sweeps.trials import Trial, TrialRobot, set_off
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.envelopes import trot_of

@@ -16,8 +16,8 @@ import numpy as np
 from controller import GO2Controller
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.cli.progress import ProgressLine
-from controller.demo.report import StepResult
 from controller.demo.run import DemoProgress, run_demo
+from controller.demo.steps import StepResult
 from go2_wbc.compilation import Kernel, all_kernels, call_plain, load_kernels
 from go2_wbc.plant import MujocoPlant
 

@@ -1,7 +1,7 @@
 """``python -m benchmarks probability``: is the chance that the check states the one that it has?
 
 Every motion of the exam is checked and played in random worlds. ``--fit`` fits the model of
-``motions.feasibility.probability`` to the train half and to random sentences of the language, and
+``motions.feasibility.report`` to the train half and to random sentences of the language, and
 stores it; what is reported is of the test half, whose families no threshold and no fit has seen.
 """
 
@@ -16,15 +16,15 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.command import add_sweep, positive, publish, run_sweep
+from benchmarks.figures import reliability_figure
 from benchmarks.probability_fit import Calibration, Sample, calibration, fit
 from benchmarks.probability_runs import DRAWN, motion_and_world, seeds, trial
 from benchmarks.validation_set.drawing import TEST, TRAIN
 from controller.cli.common import ExitCode, Subparsers, add_parser
-from controller.sweeps.rows import Row
 from controller.sweeps.summary import rate_interval
+from controller.sweeps.sweep_file import Row
 from go2_wbc.files import checked_output, write_atomically
-from motions.feasibility.probability import FILE, ProbabilityModel, fitted
-from viz.render.evidence_plot import reliability_figure
+from motions.feasibility.report import FILE, ProbabilityModel, fitted
 from viz.style import PLOT_SUFFIXES, save_figure
 
 FITTED = (TRAIN, DRAWN)  # What the model may be fitted to

@@ -1,4 +1,4 @@
-"""Fits the model of ``motions.feasibility.probability`` to outcomes, and judges its calibration."""
+"""Fits the model of ``motions.feasibility.report`` to outcomes, and judges its calibration."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.optimize import minimize
 from scipy.special import expit, log_expit
 
-from motions.feasibility.probability import ProbabilityModel, Rise
+from motions.feasibility.report import ProbabilityModel, Rise
 
 LEAST_SAMPLES = 20
 """Runs in which a check must have looked at something for its curve to be fitted."""

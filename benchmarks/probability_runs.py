@@ -18,9 +18,8 @@ from benchmarks.validation_set.drawing import TEST, TRAIN
 from benchmarks.validation_set.physics import play, read_borders
 from benchmarks.validation_set.questions import IMPOSSIBLE, Question, questions
 from benchmarks.validation_set.random_timelines import RandomTimeline, random_timelines
-from controller.motion_failures import FELL, failures_of
-from controller.motion_measurement import measure_motion
-from controller.sweeps.rows import Row
+from controller.motion_measurement import FELL, failures_of, measure_motion
+from controller.sweeps.sweep_file import Row
 from controller.sweeps.trials import TrialFailed, TrialRobot
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.motion_plan import MotionPlan, Posture
@@ -48,7 +47,7 @@ def trial(seed: int) -> dict[str, object]:
     if seed >= len(runs()):  # a sentence
         sentence, checker = drawn()[seed - len(runs())], FeasibilityChecker(model())
         plan = checker.plan(sentence.line, check=False)
-        harm = failures_of(play(plan, model(), sentence.number), plan).strict
+        harm = failures_of(play(plan, model(), sentence.number), plan)
         kind = (f"sentence {sentence.number}", DRAWN, DRAWN)
         return _row(sentence.name, kind, checker.world, checker.check(plan), harm)
     question, plan = _asked(runs()[seed])
@@ -108,7 +107,7 @@ def played(plan: MotionPlan, world: World, seed: int) -> tuple[str, ...]:
         except (TrialFailed, Go2WbcError):
             return (NOT_READY,)
         measured = measure_motion(robot.go2, robot.truth, plan, model())
-    return failures_of(measured, plan).strict
+    return failures_of(measured, plan)
 
 
 @lru_cache(maxsize=1)

@@ -1,4 +1,4 @@
-"""``python -m benchmarks rough``: stairs, blocks, slopes and waves, blind; and reversals.
+"""``python -m benchmarks rough``: stairs, blocks, slopes and waves, blind and by sight; reversals.
 
 On a terrain the robot stands up, walks ahead at the row's speed, and has done it if it is at the
 other end in the time that ``LEAST_SHARE`` of that speed takes, has not fallen, comes to rest and
@@ -12,6 +12,9 @@ begin at ``FIRST_SEED``.
 - saturated: share of ticks [%] in which some motor gives all it has at its speed;
 - rough torque: root mean square of the change of a torque in 0.1 s [N m].
 
+By sight the robot has a lidar and lives on its own sensors. In front of a wall, a gap of 60 cm and
+a step of 30 cm ``move_forward`` must say that it stopped, without a touch.
+
 Reversals are ``COMMANDS``, each for ``EACH`` seconds, ``ROUNDS`` times, on level ground: what is
 told is the mean over time of the length of velocity less command, in the heading frame; also with
 commands that act 0 to 18 ms late, drawn anew every 20 ms, with 5 % of them lost, and on a friction
@@ -22,20 +25,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from benchmarks.command import Benchmark
-from benchmarks.study import Study, TrialResult
+from benchmarks.study import IDEAL, IMU, Study, TrialResult
 from controller.modes import Mode
 from controller.motion_measurement import FULL
 from controller.sweeps.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import FALLEN_TILT, TOUCH, TruthRecording
-from go2_wbc.plant.terrain import BOTH, DOWN, Blocks, Boxes, Course, Ramp, Stairs, Terrain, Waves
+from go2_wbc.plant.terrain import (
+    BOTH,
+    DOWN,
+    Blocks,
+    Boxes,
+    Course,
+    Gap,
+    Ramp,
+    Stairs,
+    Stones,
+    Terrain,
+    Waves,
+)
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle
 from go2_wbc.robot.state import JointCommand
@@ -87,6 +102,7 @@ class Way:
         length: where the robot has to come [m]; None for behind the end of the terrain.
         heading: at the start [rad].
         bar: least share of the trials that are done.
+        sees: whether the robot has a lidar; it then lives on its own sensors.
     """
 
     name: str
@@ -96,6 +112,7 @@ class Way:
     length: float | None = None
     heading: float = 0.0
     bar: float | None = 0.95
+    sees: bool = False
 
     @property
     def study(self) -> Study:
@@ -110,15 +127,19 @@ class Way:
             ("ripple", "rough torque", "N m"),
         ]
         measure = partial(measure_way, way=self)
-        return Study(self.name, {self.item: rows}, measure, done="done", group="terrain")
+        group, sensors = ("sight", None) if self.sees else ("terrain", IDEAL)
+        return Study(
+            self.name, {self.item: rows}, measure, done="done", group=group, sensors=sensors
+        )
 
     def plant(self, seed: int, sensors: str) -> MujocoPlant:
         """The simulated robot of a trial."""
         rng, terrain = np.random.default_rng(seed), self.terrain(seed)
         friction, mass, yaw = (float(rng.uniform(*bounds)) for bounds in (FRICTION, MASS, YAW))
         drawn = {"friction": friction, "mass_scale": mass, "initial_yaw": self.heading + yaw}
-        more = {"seed": seed, "sensors": sensors, "initial_joint_noise": JOINT_NOISE}
-        plant = MujocoPlant(terrain=terrain, **drawn, **more)
+        own = IMU if self.sees else sensors
+        more = {"seed": seed, "sensors": own, "initial_joint_noise": JOINT_NOISE}
+        plant = MujocoPlant(terrain=terrain, lidar=self.sees, **drawn, **more)
         q = plant.truth().q.copy()
         q[0] += float(rng.uniform(*PLACE))
         plant.place(q)
@@ -173,6 +194,36 @@ def _measured(recorded: TruthRecording) -> dict[str, float]:
     shares["saturated"] = recorded.torque_shares(RobotModel()) >= FULL
     values = {name: 100.0 * float(flags.mean()) for name, flags in shares.items()}
     return values | {"ripple": float(np.sqrt(np.mean(change**2))) if len(change) else 0.0}
+
+
+def measure_barrier(
+    trial: Trial, found: TrialResult, way: Way, first_seed: int = FIRST_SEED
+) -> None:
+    """Ask the robot to walk into what it cannot walk over: it stops, says so, and touches nothing.
+
+    Raises:
+        TrialFailed: if it does not.
+    """
+    with TrialRobot(way.plant(first_seed + trial.seed, trial.sensors)) as robot:
+        robot.require(robot.go2.stand())
+        robot.truth.clear()
+        arrived = robot.go2.move_forward(3.0)
+        measured = _measured(robot.truth.recording())
+        if " ended: " not in robot.go2.last_outcome.reason:
+            raise TrialFailed("came on" if arrived else robot.go2.last_outcome.reason)
+        if measured["calf"] + measured["trunk"] > 0.0:
+            raise TrialFailed("touched it")
+        robot.require(robot.go2.stand())
+
+
+def _barrier(way: Way) -> Study:
+    """Its rows and its trial."""
+    rows = (
+        ("done", "share that stops, says so and touches nothing", ">= 1"),
+        ("left", "way left", ">= m"),
+    )
+    measure = partial(measure_barrier, way=way)
+    return Study(way.name, {way.item: rows}, measure, done="done", group="sight", sensors=None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,6 +304,29 @@ WAYS = (
     Way("boxes", "boxes up to 12 cm, 0.5 m/s", _boxes, length=3.5),
     Way("course", "random course of 12 m, 0.5 m/s", Course.drawn, bar=None),
 )
+SEEING = (
+    Way("seen-stairs-13", "6 stairs up and down, 13 cm, 0.3 m/s", _stairs(0.13), 0.3),
+    Way("seen-stairs-16", "16 cm", _stairs(0.16), 0.3, bar=1.0),
+    Way("seen-stairs-18", "18 cm", _stairs(0.18), 0.3),
+    Way("seen-stairs-20", "20 cm", _stairs(0.20), 0.3, bar=0.8),
+    Way("seen-stairs-down", "18 cm down only", _at(Stairs(0.18, 6, 0.31, way=DOWN)), 0.3, 3.5),
+    Way("seen-stairs-aslant", "16 cm, aslant by 20 deg", _stairs(0.16), 0.3, None, ASLANT, 0.9),
+    Way("seen-blocks", "4 blocks of 20 cm, 0.5 m/s", _at(Blocks(0.20))),
+    Way("seen-slope", "ramp of 22 deg up and down, 0.5 m/s", _SLOPE),
+    Way("seen-gap-20", "gap of 20 cm, 0.5 m/s", _at(Gap(0.20))),
+    Way("seen-gap-30", "30 cm", _at(Gap(0.30)), bar=0.6),
+    Way("seen-stones", "stones of 25 cm, 10 cm between, 0.5 m/s", _at(Stones()), bar=0.8),
+    Way("seen-waves", "5 waves of 8 cm, 0.5 m/s", _at(Waves(0.08)), bar=1.0),
+    Way("seen-boxes", "boxes up to 12 cm, 0.5 m/s", _boxes, length=3.5, bar=1.0),
+    Way("seen-course", "random course of 12 m, 0.5 m/s", Course.drawn, bar=0.9),
+)
+SEEING = tuple(replace(way, sees=True) for way in SEEING)
+BARRIERS = (
+    Way("seen-wall", "wall", _at(Blocks(0.6, count=1, start=2.0))),
+    Way("seen-gap-60", "gap of 60 cm", _at(Gap(0.6, start=2.0))),
+    Way("seen-step-30", "step of 30 cm", _at(Stairs(0.3, count=1, start=2.0))),
+)
+BARRIERS = tuple(replace(way, sees=True) for way in BARRIERS)
 CASES = (
     Reversals("flat", "reversals"),
     Reversals("flat-late", "the same, 0 to 18 ms late", latest=LATEST),
@@ -261,6 +335,7 @@ CASES = (
 )
 _STUDIES = [*(way.study for way in WAYS), *(case.study for case in CASES)]
 STUDIES = (*_STUDIES, *(study.sensed(study.group) for study in _STUDIES))
+STUDIES += (*(way.study for way in SEEING), *(_barrier(way) for way in BARRIERS))
 """In the order of the report."""
 
 BENCHMARK = Benchmark(

@@ -30,9 +30,8 @@ from benchmarks.high_five import longest_run
 from benchmarks.study import IMU, Study, TrialResult
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
-from controller.motion_measurement import during_motion
+from controller.motion_measurement import during_motion, placed, trunk_off, turned_off
 from controller.sweeps.trials import JOINT_NOISE, Trial, TrialRobot
-from controller.written_motion import placed, trunk_off, turned_off
 from go2_wbc.contacts import GAITS
 from go2_wbc.errors import CommandError, ModeError, StanceMismatch
 from go2_wbc.legs import LEGS, SIDES

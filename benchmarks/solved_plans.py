@@ -13,8 +13,8 @@ from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline, find_motion, motion_names
 from motions.authoring import Choice
 from motions.dynamics.phases import PhaseProblem
+from motions.dynamics.plan_audit import PlanLimits
 from motions.dynamics.plan_cache import SHIPPED, problem_key, ship
-from motions.dynamics.plan_limits import PlanLimits
 from motions.language.keys import PhaseKey
 
 EXAMPLES = """

@@ -13,10 +13,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from benchmarks.study import Study, TrialResult
-from controller.sweeps.identity import SOURCES, identity
-from controller.sweeps.rows import SEED, Row
 from controller.sweeps.run import remove_sweep
-from controller.sweeps.sweep_file import SweepFile
+from controller.sweeps.sweep_file import SEED, Row, SweepFile
+from controller.sweeps.targets import SOURCES, identity
 from go2_wbc.config import Config
 from go2_wbc.errors import ConfigError
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from controller.sweeps.local import LocalEngine
+from controller.sweeps.engine import LocalEngine
 from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
 

@@ -6,8 +6,7 @@ import math
 from statistics import fmean
 
 from controller.behaviours.plans import PlayPlan
-from controller.checks import ground_height
-from controller.modes import Aborted, Limited, Measurements, are_within, told
+from controller.modes import Aborted, Limited, Measurements, are_within, ground_height, told
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.plant import Plant
 from go2_wbc.robot.state import Snapshot

@@ -3,59 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from pathlib import Path
-from types import UnionType
-from typing import TypeVar
 
 from go2_wbc.config import Config, load_config
-from go2_wbc.errors import CommandError, ConfigError, Go2WbcError
+from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.planning.command import finite_number
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.profile import GO2
-from go2_wbc.wbc.tasks import Task
 
 NAMESPACE = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 LONGEST = 1e6
 """Time [s] of one call: 11 days."""
-_Value = TypeVar("_Value")
 
 
-def checked(
-    name: str,
-    value: _Value,
-    kinds: type | UnionType,
-    what: str,
-    error: type[Go2WbcError] = ConfigError,
-) -> _Value:
-    """``value``, if it is one of ``kinds``; else raise ``error``: it must be ``what``."""
-    if not isinstance(value, kinds):
-        raise error(f"{name} must be {what}, got {value!r}")
-    return value
-
-
-def tasks(given: Sequence[Task]) -> tuple[Task, ...]:
-    """``given``; raise ConfigError unless all are tasks."""
-    given = checked("extra_tasks", given, list | tuple, "a list of tasks")
-    return tuple(checked("extra_tasks", task, Task, "a list of tasks") for task in given)
-
-
-def pace(realtime: bool, plant: Plant | None) -> bool:
-    """``realtime``.
-
-    Raises:
-        ConfigError: if it is neither True nor False, or False though ``plant`` needs it.
-    """
-    if (
-        not checked("realtime", realtime, bool, "True or False")
-        and plant is not None
-        and plant.is_live
-    ):
+def require_pace(plant: Plant | None, *, realtime: bool) -> None:
+    """Raise ConfigError for a ``plant`` that needs ``realtime`` without it."""
+    if plant is not None and plant.is_live and not realtime:
         raise ConfigError(
             f"{type(plant).__name__} must get commands without a break: give "
             "GO2Controller(plant=..., realtime=True)"
         )
-    return realtime
 
 
 def time(name: str, value: float) -> float:
@@ -83,16 +50,14 @@ def config(
     That is ``robot`` or the one of the ``plant``, or else a Go2.
 
     Raises:
-        ConfigError: if it is none of these, the file is wrong, or they are of different robots.
+        ConfigError: if the file is wrong, or they are of different robots.
     """
-    asked = checked("robot", robot, str | None, "the name of a robot")
     is_of = GO2 if plant is None else plant.robot
     if value is None:
-        value = Config.of_robot(asked or is_of)
+        value = Config.of_robot(robot or is_of)
     if not isinstance(value, Config):
-        what = "a Config or the path of a TOML file"
-        value = load_config(checked("config", value, Path | str, what))
-    known = {"robot": asked, "plant": plant and is_of, "config": value.robot}
+        value = load_config(value)
+    known = {"robot": robot, "plant": plant and is_of, "config": value.robot}
     if len({name for name in known.values() if name is not None}) > 1:
         told = ", ".join(f"{what} says {name!r}" for what, name in known.items() if name)
         raise ConfigError(f"of which robot? {told}; Config.of_robot(...) has a robot's numbers")

@@ -17,6 +17,7 @@ from controller.assembly import build_pilot
 from controller.modes import Aborted, Measurements, Mode, Outcome
 from controller.navigation import DriveStraight, TurnInPlace
 from controller.pacing import REASON, LogOnce
+from controller.seen_terrain import SeenTerrain
 from controller.telemetry import Telemetry
 from go2_wbc.arguments import typed
 from go2_wbc.config import Config
@@ -58,7 +59,7 @@ class GO2Controller:
         True
     """
 
-    @typed("after_tick")
+    @typed("plant", "realtime", "viewer", "config", "robot", "urdf", "after_tick", "extra_tasks")
     def __init__(
         self,
         namespace: str = "robot1",
@@ -92,13 +93,9 @@ class GO2Controller:
             PlantError: if the plant does not answer.
         """
         self._namespace = arguments.namespace(namespace)
-        viewer = arguments.checked("viewer", viewer, bool, "True or False")
-        plant = arguments.checked("plant", plant, Plant | None, "a Plant")
         config = arguments.config(config, robot, plant)
-        realtime = arguments.pace(realtime, plant)
-        urdf = arguments.checked("urdf", urdf, Path | str | None, "a path")
+        arguments.require_pace(plant, realtime=realtime)
         description = find_description(None if urdf is None else Path(urdf), config.robot)
-        tasks = arguments.tasks(extra_tasks)
         with ExitStack() as opened:
             if plant is None:
                 plant = MujocoPlant(
@@ -113,7 +110,7 @@ class GO2Controller:
                 viewer=viewer,
                 description=description,
                 after_tick=after_tick,
-                extra_tasks=tasks,
+                extra_tasks=tuple(extra_tasks),
             )
             opened.callback(self._pilot.close)
             self._resources = opened.pop_all()
@@ -153,7 +150,8 @@ class GO2Controller:
 
     # --- walking --------------------------------------------------------------------------
 
-    def walk(self, gait: str | Gait = "trot") -> bool:
+    @typed(error=CommandError)
+    def walk(self, gait: Gait | str = "trot") -> bool:
         """Enter walking mode; the robot stands ready until ``move``. Stands up first if needed.
 
         One that walks already passes over into the gait, its command clipped into the envelope.
@@ -164,7 +162,6 @@ class GO2Controller:
         Raises:
             CommandError: for an unknown gait; lists the valid ones.
         """
-        gait = arguments.checked("gait", gait, Gait | str, "a Gait or its name", CommandError)
         return self._call("walk", lambda: self._pilot.walk(gait))
 
     def move(
@@ -293,7 +290,7 @@ class GO2Controller:
             MotionInfeasible: if the motion breaks a limit of the robot; carries the findings.
         """
         self._check_open()
-        if isinstance(times, bool) or not isinstance(times, int) or times < 1:
+        if times < 1:
             raise CommandError(f"times must be a whole number of 1 or more, got {times!r}")
         plan = self.prepare(motion, check=check)
         with self._planning:
@@ -354,6 +351,11 @@ class GO2Controller:
     def state(self) -> RobotState:
         """The newest measured state, a copy that cannot be written into."""
         return self._runner.loop.state.read_only()
+
+    @property
+    def terrain(self) -> SeenTerrain | None:
+        """The ground as it has been seen; None before the first scan, and without a lidar."""
+        return self._pilot.terrain
 
     @property
     def mode(self) -> Mode:

@@ -34,9 +34,8 @@ class _Stoppable(Protocol):
 Robot = TypeVar("Robot", bound=_Stoppable)
 
 
-Answer = Outcome
-"""What came of a job, which is ``ok`` too if it has begun when the patience ends."""
-Reply = Callable[[Answer], None]
+Reply = Callable[[Outcome], None]
+"""Is told what came of a job, which is ``ok`` too if it has begun when the patience ends."""
 
 
 @dataclass(slots=True, eq=False)
@@ -93,7 +92,7 @@ class JobServer(Generic[Robot]):
             patience: time [s] after which ``expire`` answers a job that is not over.
         """
         self.robot = robot
-        self.last: Answer | None = None
+        self.last: Outcome | None = None
         self._queue, self._patience = queue, patience
         self.job: Job | None = None
         self._waiting: deque[Job] = deque()
@@ -118,7 +117,7 @@ class JobServer(Generic[Robot]):
                 self._waiting.append(job)
                 self._take_turn()
         if refusal:
-            self._answer(job, Answer(False, refusal, is_refused=True))
+            self._answer(job, Outcome(False, refusal, is_refused=True))
         return not refusal
 
     def expire(self) -> None:
@@ -128,7 +127,7 @@ class JobServer(Generic[Robot]):
             running, waiting = self.job, self._waiting
             self._waiting = deque(job for job in waiting if now <= job._due)
         if running is not None and now > running._due:
-            self._answer(running, Answer(True, f"{running.name} has begun"))
+            self._answer(running, Outcome(True, f"{running.name} has begun"))
         self._refuse((job for job in waiting if now > job._due), "has waited in vain")
 
     def cancel(self, then: Callable[[], None] | None = None) -> bool:
@@ -162,7 +161,7 @@ class JobServer(Generic[Robot]):
             self._changed.notify_all()
         self._refuse(waiting, f"was not begun: {reason}")
         if running is not None:
-            self._finish(running, Answer(False, reason, self._lasted(running)))
+            self._finish(running, Outcome(False, reason, self._lasted(running)))
         if self._thread is not None:
             self._thread.join(limit)
 
@@ -194,7 +193,7 @@ class JobServer(Generic[Robot]):
         self._finish(job, answer)
         return True
 
-    def _carry_out(self, job: Job) -> Answer:
+    def _carry_out(self, job: Job) -> Outcome:
         error: Exception
         try:
             with self._changed:  # a damp() before this keeps the job from beginning
@@ -210,11 +209,11 @@ class JobServer(Generic[Robot]):
         else:
             lasted, was_cancelled = self._lasted(job), job.is_cancelled
             if refusal:
-                return Answer(False, refusal, lasted, cancelled=was_cancelled, is_refused=True)
+                return Outcome(False, refusal, lasted, cancelled=was_cancelled, is_refused=True)
             told = f": {listed(measured)}" if measured else ""
-            return Answer(True, f"done in {lasted:.1f} s{told}", lasted, measured)
+            return Outcome(True, f"done in {lasted:.1f} s{told}", lasted, measured)
         was_cancelled = job.is_cancelled and isinstance(error, Aborted)
-        return Answer(False, message, self._lasted(job), cancelled=was_cancelled, error=error)
+        return Outcome(False, message, self._lasted(job), cancelled=was_cancelled, error=error)
 
     def _lasted(self, job: Job) -> float:
         return self.robot.state.time - job.start
@@ -243,9 +242,9 @@ class JobServer(Generic[Robot]):
 
     def _refuse(self, jobs: Iterable[Job], why: str) -> None:
         for job in jobs:
-            self._answer(job, Answer(False, f"{job.name} {why}", is_refused=True))
+            self._answer(job, Outcome(False, f"{job.name} {why}", is_refused=True))
 
-    def _finish(self, job: Job, answer: Answer) -> None:
+    def _finish(self, job: Job, answer: Outcome) -> None:
         with self._changed:
             if self.job is job:
                 self.job = None
@@ -255,7 +254,7 @@ class JobServer(Generic[Robot]):
         for then in followers:
             self._guarded(job, then)
 
-    def _answer(self, job: Job, answer: Answer) -> None:
+    def _answer(self, job: Job, answer: Outcome) -> None:
         with self._changed:
             if job._is_answered:
                 return

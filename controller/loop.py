@@ -24,7 +24,8 @@ from controller.behaviours.joints import DAMPING, Damped
 from controller.pacing import REASON
 from controller.telemetry import Telemetry
 from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible
-from go2_wbc.plant.base import Plant
+from go2_wbc.planning.height_map import HeightMap, feel, fuse
+from go2_wbc.plant.base import Plant, Scan
 from go2_wbc.reference import JointReference, Reference, Target, hold_feet, sag_and_lean
 from go2_wbc.robot.foot_watch import PULLED, FootWatch
 from go2_wbc.robot.latency import LAGS, Latency
@@ -38,6 +39,9 @@ from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
 from go2_wbc.wbc.relaxation import is_grave
 
 _log = logging.getLogger(__name__)
+
+OLDEST_SCAN = 64
+"""Ticks by which a scan may be late."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +68,7 @@ class ControlLoop:
         latency: how late that is.
         fault: why the last behaviour was ended by the loop, or None.
         health: which parts are broken.
+        heights: of the ground, as it has been seen.
         warn: writes a line of the log, as ``logging.Logger.warning`` does.
     """
 
@@ -105,6 +110,8 @@ class ControlLoop:
         self.snapshot: Snapshot = model.snapshot(self.state)
         self.latency = Latency(plant.control_period)
         self._ahead = self.state
+        self.heights = HeightMap()
+        self._past: deque[RobotState] = deque(maxlen=OLDEST_SCAN)
         self._payloads = payloads
         self._motors, self._held = MotorWatch(model.motor), np.zeros(4)
         self._feet = FootWatch(model.mass * model.gravity)
@@ -190,12 +197,25 @@ class ControlLoop:
             self.state = state
             self._ahead = state if self._is_hardware else self.latency.ahead(state)
             self.snapshot = self.model.snapshot(self._ahead, self._payload_of(self.behaviour))
+            self._see(self.plant.scan())
             return True
         silence = self._unanswered * self.plant.control_period
         if silence > self._safety.stale_limit:
             lack = "new" if is_finite else "finite"
             raise PlantTimeout(f"no {lack} state from the plant for {1000 * silence:.0f} ms")
         return False
+
+    def _see(self, scan: Scan | None) -> None:
+        """Take scan and feet into the map; a plant that has never scanned has none."""
+        past = self._past
+        if scan is None and not past:
+            return
+        past.append(self.state)
+        if scan is not None:
+            taken = min(past, key=lambda state: abs(state.time - scan.time))
+            place = taken.p_world_base, taken.R_world_base
+            fuse(self.heights, scan.p_base_points, *place, scan.deviation)
+        feel(self.heights, self.snapshot, self.state.feet_in_contact, self.plant.control_period)
 
     def _look_after_parts(self) -> None:
         """Say what has broken; a robot that cannot stand without it goes limp before it falls."""

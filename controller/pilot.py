@@ -14,19 +14,24 @@ from functools import partial
 from controller.acceptance import Acceptance
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.standing import Standing
-from controller.checks import (
+from controller.modes import (
     LYING_HEIGHT,
+    Aborted,
+    Measurements,
+    Mode,
     base_height,
     is_standing,
+    listed,
     lying,
     sitting,
     standing,
+    told,
     why_not_standing,
 )
-from controller.modes import Aborted, Measurements, Mode, listed, told
 from controller.navigation import Goal
 from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
+from controller.seen_terrain import SeenTerrain
 from controller.walker import Walker
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
@@ -35,7 +40,7 @@ from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.trunk import LEVEL, BodyPose
 from go2_wbc.plant import Plant
-from motions.postures import lie_down, rise, sit_down
+from motions.postures import lie_down, rise, sit_down, sit_raise
 
 READY_TIME = 0.2
 """Time [s] that a robot is given to stand ready in walking mode."""
@@ -86,6 +91,12 @@ class Pilot:
         return self._walker.excess(command)
 
     @property
+    def terrain(self) -> SeenTerrain | None:
+        """The ground as it has been seen; None if nothing has."""
+        heights = self._loop.heights
+        return SeenTerrain(heights, self._walker.walking.blocked) if heights.is_used else None
+
+    @property
     def body_pose(self) -> BodyPose:
         """The pose of the trunk that is being followed while the robot walks."""
         return self._walker.walking.pose if self.mode is Mode.WALKING else LEVEL
@@ -134,7 +145,10 @@ class Pilot:
         """Sit like a dog, from any mode but fallen."""
         if self.mode is not Mode.SITTING:
             self._ensure_standing()
-            self._take_posture(ChangePosture(partial(sit_down, profile=self._loop.model.profile)))
+            model = self._loop.model
+            raised = sit_raise(self._loop.snapshot.p_world_feet, model)
+            sit = partial(sit_down, profile=model.profile, raised=raised)
+            self._take_posture(ChangePosture(sit))
         return self._settle(Posture.SIT, "sit")
 
     def lie_down(self) -> Measurements:
@@ -247,10 +261,11 @@ class Pilot:
                 if self._goal is None:
                     return True
                 self._walker.follow(goal.command(loop.state))
-                return goal.is_done(loop.state)
+                return goal.is_done(loop.state) or bool(self._walker.walking.blocked)
 
             goal.begin(loop.state)
             self._runner.until(is_over, goal.time_limit, goal.name)
+            blocked = self._walker.walking.blocked
             self.rest()
             was_halted = self._goal is None
         finally:
@@ -258,6 +273,8 @@ class Pilot:
         measured = goal.measurements(loop.state)
         if was_halted:
             raise Aborted(f"{goal.name} ended by stop()", measured)
+        if blocked:
+            raise Aborted(f"{goal.name} ended: {blocked}; {listed(measured)}", measured)
         if why := told(goal.errors(loop.state)):
             raise Aborted(f"{goal.name} missed: {why}; {listed(measured)}", measured)
         return measured

@@ -15,8 +15,8 @@ from jaxtyping import Float
 
 from controller.behaviours import Behaviour
 from controller.behaviours.joints import Damped, ServoJoints
-from controller.checks import unfolded_legs
 from controller.loop import ControlLoop
+from controller.modes import unfolded_legs
 from controller.runner import Runner
 from go2_wbc.legs import LEGS, Leg
 

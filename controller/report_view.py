@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from go2_wbc.brief import counted
 from go2_wbc.errors import PlantError
 from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import MotionPlan
-from go2_wbc.plant.mujoco.ground_truth import true_runs
-from go2_wbc.recording import Recording
+from go2_wbc.recording import Recording, true_runs
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from motions import CheckedMotion, CompiledPlan, FeasibilityReport, Finding
@@ -99,9 +99,9 @@ def slider(parameter: Parameter, value: float | str) -> Slider:
 def verdict_of(report: FeasibilityReport) -> Verdict:
     """The report as what ``viz`` shows of it."""
     broken, tight = len(report.failures), len(report.warnings)
-    text = "feasible" if report.ok else _count(broken, "limit") + " broken"
+    text = "feasible" if report.ok else counted(broken, "limit") + " broken"
     if tight:
-        text += f", {_count(tight, 'tight margin')}"
+        text += f", {counted(tight, 'tight margin')}"
     margins, enough = report.margins, _LEAST_SAMPLES
     judged = [s for s in report.series if len(s.times) >= enough and s.check in margins]
     judged.sort(key=lambda item: _share_left(margins[item.check]))
@@ -234,7 +234,3 @@ def _in_motion_frame(run: Recording, model: RobotModel) -> Recording:
     q[:, :3] = turn.apply(q[:, :3] - anchor.p_world)
     q[:, 3:7] = (turn * Rotation.from_quat(q[:, 3:7])).as_quat()
     return replace(run, q=q, p_world_com=turn.apply(run.p_world_com - anchor.p_world))
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"

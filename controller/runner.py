@@ -17,10 +17,18 @@ from weakref import WeakValueDictionary
 
 from controller.behaviours import Behaviour
 from controller.behaviours.standing import Standing
-from controller.checks import posture_measurements, standing
 from controller.errands import NOT_YET, BackgroundLog, Errands, LoopEnded, LoopHangs, Pending
 from controller.loop import ControlLoop, Fault
-from controller.modes import Aborted, Limited, Measurements, are_within, listed, told
+from controller.modes import (
+    Aborted,
+    Limited,
+    Measurements,
+    are_within,
+    listed,
+    posture_measurements,
+    standing,
+    told,
+)
 from controller.pacing import Pacer
 from go2_wbc.errors import ClosedError, ModeError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from controller.behaviours.walking import Walking
-from controller.checks import calm
-from controller.modes import Limited
+from controller.modes import Limited, calm
 from controller.runner import Runner
 from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS, Gait, find_gait
@@ -55,8 +54,9 @@ class Walker:
         """Stand ready to walk with ``gait``."""
         choice = self._choice(gait)
         gait = find_gait(LADDER[0] if gait == AUTO else gait)
-        model, before = self._runner.loop.model, self.walking
-        walking = Walking(model, gait, self._config.locomotion, before.friction, before.has_slid)
+        loop, before = self._runner.loop, self.walking
+        known = before.friction, before.has_slid, loop.heights
+        walking = Walking(loop.model, gait, self._config.locomotion, *known)
         walking.choice = choice
         self._runner.engage(walking)
         self.walking = walking

@@ -58,3 +58,8 @@ def told(value: object) -> str:
 def cut(line: str) -> str:
     """``line``, its end left out if it is longer than ``LONGEST``."""
     return line if len(line) <= LONGEST else f"{line[: LONGEST - 4]}...{line[-1]}"
+
+
+def counted(number: int, what: str) -> str:
+    """``1 limit``, ``2 limits``."""
+    return f"{number} {what}{'' if number == 1 else 's'}"

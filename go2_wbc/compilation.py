@@ -54,6 +54,7 @@ PLAIN_VARIABLE = "GO2_WBC_PLAIN"
 _IS_PLAIN = os.environ.get(PLAIN_VARIABLE, "0") not in ("", "0")
 MODULES = (
     "go2_wbc.algebra.active_set",
+    "go2_wbc.planning.height_map",
     "go2_wbc.planning.locomotion",
     "go2_wbc.planning.rest",
     "go2_wbc.plant.mujoco.layout",

@@ -184,6 +184,12 @@ class Recording:
         )
 
 
+def true_runs(flags: Bool[np.ndarray, " n"]) -> list[slice]:
+    """Where ``flags`` is true without a gap, in order."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
 def viewer(name: str) -> Any:  # noqa: ANN401 - each makes something else of a recording
     """What makes a plot, or the content of a file, of a recording: an entry point, as of ``viz``.
 

@@ -301,6 +301,12 @@ class Anchor:
     p_world: Float[np.ndarray, "3"]
     yaw: float
 
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        """x, y [m] and yaw [rad]."""
+        x, y, _ = self.p_world.tolist()
+        return x, y, self.yaw
+
     @staticmethod
     def of_feet(p_world_feet: Float[np.ndarray, "4 3"], foot_radius: float) -> Anchor:
         """The anchor below four standing feet, given their centres [m] and radius [m]."""

@@ -11,9 +11,10 @@ from jaxtyping import Float
 
 from go2_wbc.curves import Curve
 from go2_wbc.motion_plan import MotionPlan, Posture
-from go2_wbc.reference import Reference, Target, TrackedPoint
+from go2_wbc.reference import Anchor, Reference, Target, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.profile import RobotProfile, find_profile
+from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.tracking.plan_curves import stand
 from motions.batch_kinematics import Wanted, attitudes, place
 
@@ -21,6 +22,10 @@ NORMAL_FORCE_MIN = 0.0
 """Least normal force [N] asked of a foot: none, so that a pushed robot may tip and come back."""
 NORMAL_FORCE_MAX = 400.0
 """Greatest normal force [N]: 2.5 times the robot's weight, never active in slow motions."""
+LEAST_REACH = 0.03
+"""Least reach [m] of a sitting robot's rear legs in their planes; 0.05 on feet below the hips."""
+MOST_RAISED = 0.012
+"""Most that narrow feet raise a sit [m], inside of ``checks.HEIGHT_TOLERANCE``."""
 SETTLING_STEPS = 10
 """Steps that put the CoM of a standing robot in its place; see ``place``."""
 
@@ -137,11 +142,34 @@ def lean(
 
 
 def sit_down(
-    start: Float[np.ndarray, "6"], duration: float = 1.5, profile: RobotProfile | None = None
+    start: Float[np.ndarray, "6"],
+    duration: float = 1.5,
+    profile: RobotProfile | None = None,
+    raised: float = 0.0,
 ) -> PosturePlan:
-    """From a standing base pose (6,) to the dog-like sit."""
-    way = Curve((0.0, duration), (start, (profile or find_profile()).sit_pose))
+    """From a standing base pose (6,) to the dog-like sit; ``raised``: see ``sit_raise``."""
+    pose = (profile or find_profile()).sit_pose
+    pose[2] += raised
+    way = Curve((0.0, duration), (start, pose))
     return PosturePlan("sit", Posture.STAND, Posture.SIT, TrackedPoint.BASE, way)
+
+
+def sit_raise(p_world_feet: Float[np.ndarray, "4 3"], model: RobotModel) -> float:
+    """How much higher [m] than its profile's sit a robot on narrow feet sits, MOST_RAISED at most.
+
+    With the foot at (y, z) from the axis of hip abduction, y^2 + z^2 = w^2 + l^2, where w is the
+    width of the hip and l how far the leg reaches in its plane. At l = 0 the leg is singular: on
+    the other side of it the calf folds onto its stop.
+    """
+    _, _, height, _, pitch, _ = model.profile.sit_pose
+    anchor = Anchor.of_feet(p_world_feet, model.foot_radius)
+    p_feet = (p_world_feet - anchor.p_world) @ yaw_rotation(anchor.yaw)
+    p_hips = model.p_base_hips[2:]
+    x = p_feet[2:, 0]
+    y = p_feet[2:, 1] - p_hips[:, 1]
+    z = np.sqrt(np.maximum(0.0, model.hip_width**2 + LEAST_REACH**2 - y**2))
+    needed = model.foot_radius + (z + np.sin(pitch) * x - p_hips[:, 2]) / np.cos(pitch)
+    return float(np.clip(needed.max() - height, 0.0, MOST_RAISED))
 
 
 def lie_down(

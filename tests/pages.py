@@ -110,14 +110,14 @@ def command_lines(name: str) -> list[list[str]]:
 def run_python(text: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """Run a Python block alone, in ``folder``."""
     if USERS_BIN:
-        return _of_user([f"{USERS_BIN}/python", "-c", text], folder)
+        return as_user([f"{USERS_BIN}/python", "-c", text], folder)
     return run_script(["-c", text], folder, _environment())
 
 
 def run_command(words: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
     """Run ``go2-wbc``, ``pytest`` or ``python`` of this checkout, installed or not."""
     if USERS_BIN:
-        return _of_user([f"{USERS_BIN}/{words[0]}", *words[1:]], folder)
+        return as_user([f"{USERS_BIN}/{words[0]}", *words[1:]], folder)
     program = {
         "go2-wbc": ["-m", "controller.cli.main"],
         "pytest": ["-m", "pytest", "-p", "motions.pytest_plugin"],
@@ -136,7 +136,7 @@ def run_command(words: Sequence[str], folder: Path) -> subprocess.CompletedProce
     )
 
 
-def _of_user(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
+def as_user(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
     """As typed by somebody whose environment is on the path."""
     path = f"{USERS_BIN}:{os.environ['PATH']}"
     environment = {name: os.environ[name] for name in ("HOME",) if name in os.environ}

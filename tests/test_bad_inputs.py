@@ -35,8 +35,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controller.cli.common import ExitCode
-from controller.cli.options import folder
+from controller.cli.common import ExitCode, folder
 from controller.sweeps.engine import ONE_THREAD
 from go2_wbc.errors import Go2WbcError
 from motions import deg, find_motion
@@ -368,7 +367,7 @@ def stop_before_work() -> None:
     for where, *methods in (
         ("go2_wbc.plant.mujoco.plant:MujocoPlant", "write"),
         ("motions.feasibility.check:FeasibilityChecker", "evaluate", "check", "plan"),
-        ("controller.sweeps.local:LocalEngine", "run"),
+        ("controller.sweeps.engine:LocalEngine", "run"),
     ):
         module, _, name = where.partition(":")
         for method in methods:

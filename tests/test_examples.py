@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.pages import USERS_BIN, as_user
 from tests.script_server import run_script
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -61,6 +62,7 @@ POINTS = {
     "29_ros2_student_class": ("up: True", "walk: True", "high_five: True", "sit: True"),
     "30_sport_client": ("version: 1", "'STAND_UP': 0, 'BALANCE_STAND': 0"),
     "31_walk_with_my_own_task": (r"0 tasks .* 0\.1\d\d rad/s", r"1 tasks .* rad/s, [345]\d%"),
+    "32_stairs_by_sight": ("at first: <SeenTerrain", r"climbed (4[5-9]|5[01]) cm"),
 }
 """What must be read in the output of each: regular expressions."""
 DEAD_MOTORS = """
@@ -88,13 +90,17 @@ def name_of(script: Path) -> str:
 
 
 def run(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run this Python in ``folder`` on the packages of this checkout."""
+    """Run this Python in ``folder`` on the packages of this checkout, or a user's."""
+    if USERS_BIN:
+        return as_user([f"{USERS_BIN}/python", *arguments], folder)
     return run_script(arguments, folder, {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "100"})
 
 
 def must_run(script: Path) -> bool:
     """Whether what the example needs is here, or has to be."""
     module = NEEDS.get(script.stem, "sys")
+    if USERS_BIN:
+        return as_user([f"{USERS_BIN}/python", "-c", f"import {module}"], ROOT).returncode == 0
     demanded = {"rclpy": "GO2_WBC_REQUIRE_ROS2", "cyclonedds": "GO2_WBC_REQUIRE_UNITREE"}
     is_here = importlib.util.find_spec(module) is not None
     return is_here or demanded.get(module, "") in os.environ
@@ -104,6 +110,9 @@ def must_run(script: Path) -> bool:
 @pytest.mark.parametrize("script", SCRIPTS, ids=name_of)
 def test_an_example_runs_and_prints_its_point(script: Path, tmp_path: Path) -> None:
     if not must_run(script):
+        if USERS_BIN:
+            said = run([str(script)], tmp_path).stdout
+            assert re.search(r"python -m pip install|docs/ros2\.md", said)
         pytest.skip(f"{NEEDS[script.stem]} is not installed")
     done = run([str(script)], tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from tests.pages import difference
+from tests.pages import USERS_BIN, as_user, difference
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "docs" / "notebooks"
@@ -63,18 +63,22 @@ def pictures(cell: dict[str, Any]) -> int:
 def test_a_notebook_runs_from_a_clean_kernel_as_it_is_committed(
     notebook: Path, tmp_path: Path
 ) -> None:
-    if MISSING:
+    if MISSING and not USERS_BIN:
         reason = f"not installed: {', '.join(MISSING)}"
         assert not IS_REQUIRED, reason
         pytest.skip(reason)
-    done = subprocess.run(
-        [sys.executable, str(FOLDER / "execute.py"), notebook.stem, "--out", str(tmp_path)],
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=HANGS,
-    )
+    command = [str(FOLDER / "execute.py"), notebook.stem, "--out", str(tmp_path)]
+    if USERS_BIN:
+        done = as_user([f"{USERS_BIN}/python", *command], tmp_path)
+    else:
+        done = subprocess.run(
+            [sys.executable, *command],
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=HANGS,
+        )
     assert done.returncode == 0, done.stderr
     fresh = tmp_path / notebook.name
     for old, new in zip(cells(notebook), cells(fresh), strict=True):

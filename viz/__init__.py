@@ -9,10 +9,9 @@ from go2_wbc.lazy import lazy_exports
 if TYPE_CHECKING:
     from viz.content import Annotation, MarginCurve, ReplayContent, Verdict
     from viz.render.animation import ANIMATION_SUFFIXES, export_animation
-    from viz.render.distribution_plot import export_distributions
     from viz.render.margin_plot import export_plot, margin_figure
-    from viz.render.relation_plot import Relation, export_relations
     from viz.render.still import export_filmstrip
+    from viz.render.study_plots import Relation, export_distributions, export_relations
     from viz.replay.html_page import HTML_SUFFIXES, export_html
     from viz.style import PLOT_SUFFIXES
 

@@ -7,12 +7,21 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.study import Study, TrialResult
 from benchmarks.validation_set.questions import Question, draws
-from controller.motion_failures import failures_of
-from controller.motion_measurement import MotionMeasurement, measure_motion
+from controller.motion_measurement import (
+    FELL,
+    MOMENT,
+    SLIP,
+    UNPLANNED,
+    MotionMeasurement,
+    failures_of,
+    measure_motion,
+    short_legs,
+)
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import write_atomically
@@ -27,6 +36,61 @@ NEAR, NEAR_SOLVED = 1.06, 1.13
 STEP, STEP_SOLVED = 1.6, 1.25  # Ratio of amplitudes in the search for two that differ
 BORDER, PLAYS = "border", "plays"
 BORDERS_FILE = Path(__file__).parent / "borders.json"
+STRICT, STOPS, LENIENT = "strict", "stops", "lenient"
+LENIENT_OFF = 0.05
+"""Distance [m] that anything may be off what was written, leniently."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotionFailures:
+    """What went wrong, in words, by each definition; nothing did where it is empty.
+
+    Attributes:
+        strict: what an author sees: not done, or not as it was written.
+        stops: the same, or a joint was pressed against its stop: MuJoCo's hold a joint within
+            0.02 rad of its limit, so a motion that asks for more often looks done.
+        lenient: distances from the plan, with more room, whatever ``play`` says.
+        fell: nothing else.
+    """
+
+    strict: tuple[str, ...]
+    stops: tuple[str, ...]
+    lenient: tuple[str, ...]
+    fell: tuple[str, ...]
+
+    def by(self, definition: str) -> tuple[str, ...]:
+        """What went wrong by ``STRICT``, ``STOPS``, ``LENIENT`` or ``FELL``."""
+        found: tuple[str, ...] = getattr(self, definition)
+        return found
+
+
+def verdicts_of(run: MotionMeasurement, plan: MotionPlan) -> MotionFailures:
+    """Judge what was measured by all definitions."""
+    strict = failures_of(run, plan)
+    fell = _true({FELL: run.fall is not None})
+    if UNPLANNED in strict:
+        return MotionFailures(strict, strict, strict, fell)
+    pressed = _true({f"on a stop {1e3 * run.stopped:.0f} ms": run.stopped > MOMENT})
+    return MotionFailures(strict, (*strict, *pressed), _leniently(run, plan), fell)
+
+
+def _leniently(run: MotionMeasurement, plan: MotionPlan) -> tuple[str, ...]:
+    off = max(run.tracking, run.ends_off, run.feet_off, short_legs(plan) - run.feet_off)
+    return _true(
+        {
+            FELL: run.fall is not None,
+            f"slip {1e3 * run.slip:.0f} mm": run.slip > SLIP,
+            f"{1e3 * off:.0f} mm off": off > LENIENT_OFF,
+            f"touch {1e3 * run.touched:.0f} ms": run.touched > MOMENT,
+            f"saturated {1e3 * run.saturated:.0f} ms": run.saturated > MOMENT,
+            f"joint {-run.joint_distance:.3f} rad past": run.joint_distance < 0.0,
+            f"joint at {100.0 * run.speed:.0f} % speed": run.speed > 1.0,
+        }
+    )
+
+
+def _true(found: dict[str, bool]) -> tuple[str, ...]:
+    return tuple(what for what, is_so in found.items() if is_so)
 
 
 def play(
@@ -48,7 +112,7 @@ def is_done(question: Question) -> bool:
     """Whether physics does a motion, by the strict definition."""
     model = RobotModel()
     plan = question.plan(model)
-    return not failures_of(play(plan, model, question.draw), plan).strict
+    return not failures_of(play(plan, model, question.draw), plan)
 
 
 def measure_border(trial: Trial, found: TrialResult) -> None:

@@ -12,16 +12,9 @@ from typing import NamedTuple
 from scipy.stats import binomtest
 
 from benchmarks.validation_set.drawing import TEST, TRAIN
+from benchmarks.validation_set.physics import LENIENT, STOPS, STRICT, MotionFailures
 from benchmarks.validation_set.questions import STRATA
-from controller.motion_failures import (
-    FELL,
-    LENIENT,
-    NOT_DONE,
-    STOPS,
-    STRICT,
-    UNPLANNED,
-    MotionFailures,
-)
+from controller.motion_measurement import FELL, NOT_DONE, UNPLANNED
 
 _ROW = "{name:<17}{n:>4}{done:>5}" + "".join(f"{{shares[{k}]:>13}}" for k in range(4))
 _HEADS = ("refused", "wrong:", "passed", "done:")
@@ -116,7 +109,7 @@ class Score(NamedTuple):
 
     @staticmethod
     def of(cases: Iterable[Case], definition: str = STRICT) -> Score:
-        """The score on ``cases`` by a definition of ``controller.motion_failures``."""
+        """The score on ``cases`` by a definition of ``controller.motion_measurement``."""
         pairs = [(bool(case.refusal), bool(case.outcome.by(definition))) for case in cases]
         both, neither = pairs.count((True, True)), pairs.count((False, False))
         refused, failed = sum(r for r, _ in pairs), sum(f for _, f in pairs)

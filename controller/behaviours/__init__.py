@@ -29,12 +29,8 @@ class Behaviour(ABC):
     may_lie: bool = False
     is_dynamic: bool = False
     knows_payload: bool = False
+    sag_and_lean: tuple[float, float] | None = None
     delay: float = 0.0
-
-    @property
-    def sag_and_lean(self) -> tuple[float, float] | None:
-        """See the attributes."""
-        return None
 
     def start(self, snapshot: Snapshot) -> None:
         """Begin from the measured state."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from go2_wbc.motion_plan import MotionPlan
-from go2_wbc.plant.mujoco.ground_truth import true_runs
+from go2_wbc.recording import true_runs
 from go2_wbc.reference import Reference
 
 TURNING = 0.3

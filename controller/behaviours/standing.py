@@ -112,7 +112,7 @@ class Standing(ChangePosture):
         return self._steps is not None
 
     @property
-    def sag_and_lean(self) -> tuple[float, float] | None:  # type: ignore[override]
+    def sag_and_lean(self) -> tuple[float, float] | None:
         """From the plan; while it steps, from what is tracked."""
         return None if self.is_stepping else super().sag_and_lean
 

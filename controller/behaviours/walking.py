@@ -11,6 +11,7 @@ from go2_wbc.contacts import Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.envelopes import DWELL, GaitChoice
 from go2_wbc.planning.gait_clock import time_between
+from go2_wbc.planning.height_map import HeightMap
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.planning.trunk import LEVEL, SETTLED_COMMAND, BodyPose
 from go2_wbc.reference import Reference
@@ -18,6 +19,9 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import Snapshot
 
 _log = logging.getLogger(__name__)
+
+STEADYING = 0.15
+"""Speed [m/s] up to which a command only keeps the robot in its place, as while it turns."""
 
 
 class Walking(Behaviour):
@@ -36,16 +40,21 @@ class Walking(Behaviour):
         config: LocomotionConfig,
         friction: float | None = None,
         has_slid: bool = True,
+        heights: HeightMap | None = None,
     ) -> None:
-        """Walk with ``gait``, on ground of which that is known; see ``LocomotionPlanner.start``."""
+        """Walk with ``gait``, on ground of which that is known; see ``LocomotionPlanner``."""
         self.gait = gait
         self._known_friction, self._had_slid = friction, friction is not None and has_slid
         self.command: VelocityCommand = ZERO_COMMAND
         self.pose: BodyPose = LEVEL
         self.choice: GaitChoice | None = None
         self._limit, self._is_limited_until = VelocityEnvelope(), -np.inf
-        self._planner, self._most = LocomotionPlanner(model, gait, config), config.rough.speed
-        self._has_told = False
+        self._planner, self._most = (
+            LocomotionPlanner(model, gait, config, heights),
+            config.rough.speed,
+        )
+        self._heights = heights
+        self._has_told, self._told_block = False, ""
 
     def start(self, snapshot: Snapshot) -> None:
         """Start from the measured state, standing."""
@@ -67,6 +76,11 @@ class Walking(Behaviour):
                 _log.warning("commands act %.0f ms late: it walks slower", 1000.0 * self.delay)
             else:
                 _log.warning("rough ground: %g m/s at most until it is smooth again", self._most)
+        if self._heights is not None and self._heights.is_used:
+            blocked = self.blocked
+            if blocked and not self._told_block:
+                _log.warning("stopped: %s", blocked)
+            self._told_block = blocked
         return reference
 
     def square_up(self, snapshot: Snapshot) -> bool:
@@ -113,10 +127,16 @@ class Walking(Behaviour):
 
         The robot itself may yet catch up.
         """
-        if self._planner.is_slowed:
+        if self._planner.is_slowed or self._planner.sight.is_slowed:
             return True
         command = self.command.linear_x, self.command.linear_y, self.command.angular_z
         return bool(np.allclose(self._planner.velocity, command, atol=SETTLED_COMMAND))
+
+    @property
+    def blocked(self) -> str:
+        """What stops the robot that is commanded to go on, in plain words; "" if nothing does."""
+        sight, asked = self._planner.sight, np.hypot(self.command.linear_x, self.command.linear_y)
+        return sight.why_blocked if sight.is_slowed and asked > STEADYING else ""
 
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether the robot has come to rest."""

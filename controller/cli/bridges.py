@@ -11,8 +11,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
 from controller.bridges.unitree import LOOPBACK
-from controller.cli.common import ExitCode, print_json_line
-from controller.cli.options import Mjcf, Numbers, dds_domain
+from controller.cli.common import ExitCode, Mjcf, Numbers, dds_domain, print_json_line
 from go2_wbc.errors import PlantError
 from go2_wbc.world import SENSORS
 
@@ -122,7 +121,7 @@ def unitree_drive(
     """
     from controller.arguments import config as read_config
     from controller.bridges.unitree.drive import Trot, check_steps, drive
-    from controller.bridges.unitree.guards import GuardConfig
+    from controller.bridges.unitree.low_level import GuardConfig
     from controller.bridges.unitree.plant import UnitreePlant
 
     check_steps([*steps])

@@ -1,14 +1,30 @@
-"""What every subcommand of ``go2-wbc`` shares: exit codes, parsers and JSON output."""
+"""What every subcommand of ``go2-wbc`` shares: exit codes, JSON output, and its options.
+
+A subcommand is made of a function: its parameters are the options, its docstring is the help. A
+parameter by place is an argument, one by name an option: a flag if it is a bool, required if it has
+no default. What ``Annotated`` adds to the type: words, which are the help, or what stands for the
+value and the help; a tuple of what may be chosen; a function that makes a value of a text.
+``T | None`` is a T that may be missing, ``tuple[T, ...]`` several in a row, ``Sequence[T]`` several
+that each have the option before them. A dataclass stands for its fields, as a part of the help if
+it is annotated with a title.
+"""
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import importlib.metadata
+import inspect
 import json
 import textwrap
+from collections.abc import Callable, Iterator, Sequence
 from enum import IntEnum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import NoneType
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
+
+import viz
+from go2_wbc.files import checked_output
 
 if TYPE_CHECKING:
     Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -81,3 +97,122 @@ def installed_version(distribution: str) -> str | None:
         return importlib.metadata.version(distribution)
     except importlib.metadata.PackageNotFoundError:
         return None
+
+
+WIDTH = 78
+"""Columns of a help text: those of ``argparse`` in a terminal of 80."""
+T = TypeVar("T")
+
+
+def add_command(subparsers: Subparsers, name: str, function: Callable[..., int]) -> None:
+    """Add the subcommand ``name``: the ``run`` of what is parsed calls the function."""
+    text, _, examples = (inspect.getdoc(function) or "").partition("\n\nExamples:\n")
+    paragraphs = [
+        part if "\n " in part else textwrap.fill(" ".join(part.split()), WIDTH)
+        for part in text.split("\n\n")
+    ]
+    examples = textwrap.dedent(examples)
+    parser = add_parser(subparsers, name, "\n\n".join(paragraphs), examples=examples)
+    _add_options(parser, function)
+    parser.set_defaults(run=lambda given: _called(function, given))
+
+
+def _add_options(parser: argparse._ActionsContainer, call: Callable[..., object]) -> None:
+    for parameter, kind, notes in _parameters(call):
+        words = [note for note in notes if isinstance(note, str)]
+        if _is_part(kind):
+            _add_options(parser.add_argument_group(*words) if words else parser, kind)
+            continue
+        settings = {**_taken(kind, parameter), "help": words[-1] if words else None}
+        if len(words) > 1:
+            settings["metavar"] = words[0]
+        for note in notes:
+            if not isinstance(note, str):
+                settings["type" if callable(note) else "choices"] = note
+        is_option = parameter.kind is parameter.KEYWORD_ONLY
+        name = f"--{parameter.name.replace('_', '-')}" if is_option else parameter.name
+        parser.add_argument(name, **settings)
+
+
+def _parameters(call: Callable[..., object]) -> Iterator[tuple[inspect.Parameter, Any, list[Any]]]:
+    """The parameters of a function or dataclass, with their types and what these are given."""
+    hints = get_type_hints(call, include_extras=True)
+    for name, parameter in inspect.signature(call).parameters.items():
+        hint = hints[name]
+        kind, *notes = get_args(hint) if get_origin(hint) is Annotated else (hint,)
+        yield parameter, kind, notes
+
+
+def _is_part(kind: object) -> bool:
+    return dataclasses.is_dataclass(kind)
+
+
+def _taken(kind: object, parameter: inspect.Parameter) -> dict[str, Any]:
+    """How ``argparse`` takes a parameter of this type."""
+    if kind is bool:
+        return {"action": "store_true"}
+    is_option, default = parameter.kind is parameter.KEYWORD_ONLY, parameter.default
+    parts = [part for part in get_args(kind) if part not in (NoneType, Ellipsis)]
+    taken: dict[str, Any] = {"type": parts[0] if parts else kind}
+    if get_origin(kind) is Sequence:
+        return {**taken, "action": "append", "default": list(default)}
+    if default is parameter.empty:
+        return {**taken, "required": True} if is_option else taken
+    several = "+" if is_option else "*"
+    one = None if is_option else "?"
+    return {**taken, "default": default, "nargs": several if get_origin(kind) is tuple else one}
+
+
+def _called(call: Callable[..., T], given: argparse.Namespace) -> T:
+    """What ``call`` gives for its options."""
+    values: dict[str, Any] = {}
+    for parameter, kind, _ in _parameters(call):
+        value = _called(kind, given) if _is_part(kind) else getattr(given, parameter.name)
+        values[parameter.name] = tuple(value) if isinstance(value, list) else value
+    return call(**values)
+
+
+# --- what several commands take -------------------------------------------------------------------
+
+
+def reader(
+    kind: Callable[[str], T], is_valid: Callable[[T], bool], told: str
+) -> Callable[[str], T]:
+    """What makes a valid value of a text; ``told`` says what it must be."""
+
+    def read(text: str) -> T:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = None
+        if value is None or not is_valid(value):
+            raise argparse.ArgumentTypeError(f"must be {told}, got {text!r}")
+        return value
+
+    return read
+
+
+def folder(text: str) -> Path:
+    """The folder of this name."""
+    if not text:
+        raise argparse.ArgumentTypeError("must be a folder, got ''")
+    return Path(text)
+
+
+def output(*suffixes: str) -> Callable[[str], Path]:
+    """What makes of a text a file that can be written, or raises ConfigError."""
+    return lambda text: checked_output(text, suffixes)
+
+
+def drawing(kind: str) -> Callable[[str], Path]:
+    """The same for what ``viz`` draws of this kind."""
+    return lambda text: checked_output(text, getattr(viz, f"{kind}_SUFFIXES"))
+
+
+page_file, plot_file, video_file = drawing("HTML"), drawing("PLOT"), drawing("ANIMATION")
+whole = reader(int, lambda value: 0 <= value < 2**63, "a whole number of 0 or more")
+dds_domain = reader(int, lambda value: 0 <= value <= 232, "a domain of DDS, 0 to 232")
+Json = Annotated[bool, "print JSON"]
+Html = Annotated[Path | None, "FILE", "write a 3D replay page", page_file]
+Numbers = Annotated[Path | None, "FILE", "TOML with other numbers"]
+Mjcf = Annotated[Path | None, "FILE", "your own Go2 model or scene"]

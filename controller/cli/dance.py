@@ -6,9 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from controller.cli.common import ExitCode, print_json, shown_path
+from controller.cli.common import ExitCode, Html, Json, print_json, shown_path, whole
 from controller.cli.motion_run import getting_ready
-from controller.cli.options import Html, Json, whole
 from controller.cli.progress import ProgressLine
 
 if TYPE_CHECKING:

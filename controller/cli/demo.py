@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import count, groupby
 from pathlib import Path
@@ -14,18 +16,26 @@ import numpy as np
 from jaxtyping import Int
 
 import viz  # what is named viz.X below is imported when something is drawn
-from controller.cli.common import ExitCode, print_json, shown_path
-from controller.cli.demo_table import render, render_steps
-from controller.cli.options import Mjcf, Numbers, folder, reader, whole
+from controller.cli.common import (
+    ExitCode,
+    Mjcf,
+    Numbers,
+    folder,
+    print_json,
+    reader,
+    shown_path,
+    whole,
+)
 from controller.cli.progress import ProgressLine
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.files import checked_output, write_atomically
 
 if TYPE_CHECKING:
-    from controller.demo.report import DemoReport
     from controller.demo.run import DemoProgress
+    from controller.demo.steps import DemoReport, DemoTotals, Measurement, StepResult
     from controller.go2_controller import GO2Controller
     from go2_wbc.recording import Recording
+
 
 BACKENDS = ("condensed", "full", "placo")
 SOLVERS = ("active_set", "daqp", "proxqp", "quadprog")
@@ -134,8 +144,7 @@ def _run_over_ros(namespace: str, *, as_json: bool) -> int:
     """Run the demo on a robot that another process serves, print the steps."""
     from controller.bridges.ros2.demo import run_ros_demo
     from controller.cli.progress import ProgressLine
-    from controller.demo.report import DemoReport
-    from controller.demo.steps import DEMO_STEPS
+    from controller.demo.steps import DEMO_STEPS, DemoReport
 
     number = count(1)
     with ProgressLine() as line:
@@ -264,3 +273,73 @@ def _longest_mode(recording: Recording, rows: Int[np.ndarray, " k"], feet: int) 
     """The longest run of ``rows`` in which the same ``feet`` feet are in stance."""
     modes = groupby(rows.tolist(), key=lambda row: recording.stance[row].tolist())
     return max((list(run) for mode, run in modes if sum(mode) == feet), key=len, default=[])
+
+
+WIDTH = 80
+_HEADER = f"     {'step':<21}{'time':>7}  {'figure':<23}{'asked':>9}{'measured':>9}"
+_INDENT = " " * 5
+_DECIMALS = {"deg": 1}
+"""Decimals of a unit's numbers; 3 for any other."""
+
+
+def render(report: DemoReport, encoding: str | None = None) -> str:
+    """The table of steps, the totals and the verdict.
+
+    Args:
+        encoding: of the terminal; ticks and crosses become words where it lacks them.
+    """
+    done = sum(step.ok for step in report.steps)
+    verdict = f"{done} of {len(report.steps)} steps done."
+    if report.ok:
+        verdict = f"All {done} steps done, each judged by what was measured."
+    return "\n".join(
+        [render_steps(report.steps, encoding), *_total_rows(report.totals), "", verdict]
+    )
+
+
+def render_steps(steps: Sequence[StepResult], encoding: str | None = None) -> str:
+    """The table of steps alone, with a line below; see ``render``."""
+    marks = _marks(encoding)
+    rows = [_HEADER, "-" * WIDTH]
+    for step in steps:
+        head = f"{marks[step.ok]:>4} {step.label:<21}{step.duration:>5.1f} s  "
+        first, *others = [_cells(figure) for figure in step.figures] or [""]
+        rows += [(head + first).rstrip(), *(" " * len(head) + cells for cells in others)]
+        if not step.ok:
+            rows += textwrap.wrap(
+                step.reason, WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT
+            )
+    return "\n".join([*rows, "-" * WIDTH])
+
+
+def _marks(encoding: str | None) -> dict[bool, str]:
+    try:
+        "✓✗".encode(encoding or "ascii")
+    except (UnicodeEncodeError, LookupError):
+        return {True: "ok", False: "FAIL"}
+    return {True: "✓", False: "✗"}
+
+
+def _cells(figure: Measurement) -> str:
+    decimals = _DECIMALS.get(figure.unit, 3)
+    asked = "" if figure.asked is None else f"{figure.asked:.{decimals}f}"
+    measured = f"{figure.measured:.{decimals}f}" if math.isfinite(figure.measured) else "-"
+    return f"{figure.name:<23}{asked:>9}{measured:>9} {figure.unit}"
+
+
+def _total_rows(totals: DemoTotals) -> list[str]:
+    lines = (
+        ("peak joint torque", f"{100 * totals.peak_torque_ratio:.0f} % of its limit"),
+        ("peak joint speed", f"{100 * totals.peak_speed_ratio:.0f} % of its limit"),
+        ("on three legs: least support margin", _or_dash(totals.least_support_margin, "m", 3)),
+        ("on three legs: least load of a foot", _or_dash(totals.least_foot_load, "N", 0)),
+        ("control ticks without a QP solution", str(totals.qp_failures)),
+        ("robot time", f"{totals.robot_time:.1f} s"),
+        ("CPU time of control and physics", f"{totals.cpu_time:.1f} s"),
+        ("real-time factor", f"{totals.real_time_factor:.1f}"),
+    )
+    return [f"{_INDENT}{name:<38}{value}" for name, value in lines]
+
+
+def _or_dash(value: float, unit: str, decimals: int) -> str:
+    return f"{value:.{decimals}f} {unit}" if math.isfinite(value) else "-"

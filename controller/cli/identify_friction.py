@@ -7,8 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from controller.cli.common import ExitCode, print_json
-from controller.cli.options import Json, dds_domain, output
+from controller.cli.common import ExitCode, Json, dds_domain, output, print_json
 from controller.cli.progress import ProgressLine
 from go2_wbc.errors import CommandError
 

@@ -17,8 +17,14 @@ import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from controller.cli.common import PROGRAM, ExitCode, Subparsers, examples_epilog, installed_version
-from controller.cli.options import add_command
+from controller.cli.common import (
+    PROGRAM,
+    ExitCode,
+    Subparsers,
+    add_command,
+    examples_epilog,
+    installed_version,
+)
 from controller.cli.progress import TRIES
 from controller.pacing import REASON
 from go2_wbc.errors import (

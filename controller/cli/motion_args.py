@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
 
+from go2_wbc.brief import counted
 from go2_wbc.errors import CommandError, unknown_name
 
 if TYPE_CHECKING:
@@ -87,8 +88,8 @@ def motions_of(word: str) -> list[Motion]:
 def print_verdict(report: FeasibilityReport) -> None:
     """Print a line about a motion, and one for each limit that it breaks."""
     broken = [f"     {finding}" for finding in report.failures]
-    number = f"{len(broken)} limit{'' if len(broken) == 1 else 's'} broken"
-    head = report.summary() if report.ok else f"no   {report.motion:<15} {number}"
+    number = counted(len(broken), "limit")
+    head = report.summary() if report.ok else f"no   {report.motion:<15} {number} broken"
     print("\n".join([head, *broken]), flush=True)
 
 

@@ -10,7 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import viz
-from controller.cli.common import ExitCode, print_json, print_json_line, shown_path
+from controller.cli.common import (
+    ExitCode,
+    page_file,
+    plot_file,
+    print_json,
+    print_json_line,
+    reader,
+    shown_path,
+    video_file,
+)
 from controller.cli.motion_args import (
     MotionSource,
     MotionWord,
@@ -18,7 +27,6 @@ from controller.cli.motion_args import (
     print_verdict,
     the_motion,
 )
-from controller.cli.options import page_file, plot_file, reader, video_file
 from controller.cli.progress import ProgressLine
 from go2_wbc.errors import Go2WbcError
 

@@ -10,7 +10,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import viz
-from controller.cli.common import ExitCode, print_json, shown_path
+from controller.cli.common import (
+    ExitCode,
+    Html,
+    Json,
+    Mjcf,
+    Numbers,
+    output,
+    print_json,
+    shown_path,
+    video_file,
+    whole,
+)
 from controller.cli.motion_args import (
     Friction,
     MotionWord,
@@ -21,7 +32,6 @@ from controller.cli.motion_args import (
     the_motion,
 )
 from controller.cli.motion_preview import VIDEO_RATE
-from controller.cli.options import Html, Json, Mjcf, Numbers, output, video_file, whole
 from controller.cli.progress import ProgressLine
 from controller.modes import Mode
 from go2_wbc.errors import ConfigError, PlantError, StanceMismatch

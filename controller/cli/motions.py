@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from controller.cli.common import ExitCode, print_json, shown_path
+from controller.cli.common import ExitCode, Json, Numbers, folder, output, print_json, shown_path
 from controller.cli.motion_args import (
     MOTION_HELP,
     SAVED_MOTION,
@@ -27,7 +27,6 @@ from controller.cli.motion_args import (
     print_verdict,
     the_motion,
 )
-from controller.cli.options import Json, Numbers, folder, output
 from controller.cli.progress import ProgressLine
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.files import checked_output, write_atomically

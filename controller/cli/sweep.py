@@ -7,9 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from controller.cli.common import ExitCode, print_json, shown_path
+from controller.cli.common import ExitCode, Html, Json, plot_file, print_json, shown_path
 from controller.cli.motion_args import Friction, MotionWord, Payload, Settings, the_motion
-from controller.cli.options import Html, Json, plot_file
 from controller.cli.progress import ProgressLine
 from go2_wbc.errors import CommandError
 

@@ -10,14 +10,12 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, Annotated
 
-from controller.cli.common import ExitCode
-from controller.cli.options import Mjcf, Numbers
+from controller.cli.common import ExitCode, Mjcf, Numbers
 from go2_wbc.errors import CommandError
 from go2_wbc.world import SENSORS
 
 if TYPE_CHECKING:
-    from controller.gamepad import Gamepad
-    from controller.teleop import Teleop
+    from controller.teleop import Gamepad, Teleop
 
 REFRESH = 0.1
 """Time [s] between two looks at the keyboard and the robot."""
@@ -44,9 +42,8 @@ def run(
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise CommandError("teleop reads keys from a terminal; standard input or output is none")
     from controller.arguments import config as read_config
-    from controller.gamepad import LEGEND, find_gamepad
     from controller.go2_controller import GO2Controller
-    from controller.teleop import Teleop, keys_help
+    from controller.teleop import LEGEND, Teleop, find_gamepad, keys_help
     from go2_wbc.plant import MujocoPlant
 
     pad, said = (None, "keys only") if keyboard else find_gamepad()

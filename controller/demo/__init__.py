@@ -11,9 +11,15 @@ from typing import TYPE_CHECKING
 from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from controller.demo.report import DemoReport, DemoTotals, Measurement, StepResult
     from controller.demo.run import DemoProgress, run_demo
-    from controller.demo.steps import DEMO_STEPS, DemoStep
+    from controller.demo.steps import (
+        DEMO_STEPS,
+        DemoReport,
+        DemoStep,
+        DemoTotals,
+        Measurement,
+        StepResult,
+    )
 
 __all__ = [
     "DEMO_STEPS",

@@ -9,8 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.demo.report import DemoReport, DemoTotals, Measurement, StepResult
-from controller.demo.steps import DEMO_STEPS, DemoStep, StepRun
+from controller.demo.steps import (
+    DEMO_STEPS,
+    DemoReport,
+    DemoStep,
+    DemoTotals,
+    Measurement,
+    StepResult,
+    StepRun,
+)
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
 from go2_wbc.errors import ClosedError, Go2WbcError, PlantError

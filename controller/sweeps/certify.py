@@ -16,11 +16,10 @@ from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
-from controller.sweeps.identity import digest, identity
-from controller.sweeps.rows import SEED, Row
 from controller.sweeps.run import Progress, SweepResult, read_sweep, sweep
 from controller.sweeps.summary import CONFIDENCE, finite, rate_interval
-from controller.sweeps.targets import motion_target
+from controller.sweeps.sweep_file import SEED, Row
+from controller.sweeps.targets import digest, identity, motion_target
 from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.errors import CommandError

@@ -7,8 +7,8 @@ import io
 from pathlib import Path
 from typing import Any
 
-from controller.sweeps.rows import SEED
 from controller.sweeps.run import SweepResult
+from controller.sweeps.sweep_file import SEED
 from go2_wbc.errors import MissingDependency
 from go2_wbc.extras import install_line
 from go2_wbc.files import checked_output, write_atomically

@@ -11,11 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from controller.motion_failures import failures_of, shares_of
-from controller.motion_measurement import MotionMeasurement, measure_motion
+from controller.motion_measurement import MotionMeasurement, failures_of, measure_motion, shares_of
 from controller.report_view import performed
-from controller.sweeps.rows import SEED, Row
-from controller.sweeps.sweep_file import SweepFile
+from controller.sweeps.sweep_file import SEED, Row, SweepFile
 from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, TrialFailed, TrialRobot
 from go2_wbc.errors import CommandError, Go2WbcError
 from go2_wbc.motion_plan import Posture
@@ -55,7 +53,7 @@ class MotionStudy:
     def __call__(self, seed: int) -> Row:
         """Whether it was done, what went wrong, and what was measured.
 
-        See ``motion_failures`` (strict) and ``MotionMeasurement``; lengths in m, times in s.
+        See ``failures_of`` and ``MotionMeasurement``; lengths in m, times in s.
         """
         world, plant = self.drawn(seed)
         with TrialRobot(plant) as robot:
@@ -68,7 +66,7 @@ class MotionStudy:
         except (TrialFailed, Go2WbcError) as error:
             measured = replace(_NOTHING, fall=str(error))
         plan = plan_of(self.archive)
-        harm, shares = failures_of(measured, plan).strict, shares_of(measured, plan)
+        harm, shares = failures_of(measured, plan), shares_of(measured, plan)
         closest, (share, _) = max(shares.items(), key=lambda item: np.nan_to_num(item[1][0]))
         values = {**measured.as_dict(), "fall": measured.fall or ""}
         row: Row = {"done": not harm, "harm": "; ".join(harm)}

@@ -12,9 +12,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, final
 
-from controller.sweeps.engine import ONE_THREAD, Ends, Engine, Item, Trials
-from controller.sweeps.local import processors
-from controller.sweeps.worker import answer, order_of
+from controller.sweeps.engine import (
+    ONE_THREAD,
+    Ends,
+    Engine,
+    Item,
+    Trials,
+    answer,
+    order_of,
+    processors,
+)
 from go2_wbc.errors import MissingDependency, SweepError
 from go2_wbc.extras import install_line
 

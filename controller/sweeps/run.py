@@ -10,12 +10,9 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from controller.sweeps.engine import Engine, Failure
-from controller.sweeps.identity import digest
-from controller.sweeps.local import LocalEngine, processors
-from controller.sweeps.rows import SEED, Columns, Row
-from controller.sweeps.sweep_file import SweepFile
-from controller.sweeps.targets import target_of
+from controller.sweeps.engine import Engine, Failure, LocalEngine, processors
+from controller.sweeps.sweep_file import SEED, Columns, Row, SweepFile
+from controller.sweeps.targets import digest, target_of
 from go2_wbc.arguments import typed
 from go2_wbc.brief import brief, inline_html
 from go2_wbc.errors import CommandError, SweepError, unknown_name

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from controller.sweeps.rows import Columns, Row
+from controller.sweeps.sweep_file import Columns, Row
 
 CONFIDENCE = 0.95
 """How sure an interval is to hold the true rate or mean."""

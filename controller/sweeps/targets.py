@@ -1,23 +1,60 @@
-"""What is swept: words of the command line, functions, motions; as functions that workers load."""
+"""What is swept: words of the command line, functions, motions; as functions that workers load.
+
+And what the rows depend on besides the seeds: code, libraries, Python.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import importlib
+import importlib.metadata
 import inspect
+import platform
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING
 
-from controller.sweeps.identity import digest, identity
-from controller.sweeps.rows import Row, row_of
+from controller.sweeps.sweep_file import Row, row_of
 from go2_wbc.errors import CommandError, Go2WbcError, SweepError, unknown_name
 
 if TYPE_CHECKING:
     from go2_wbc.world import World
+
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCES = ("go2_wbc", "motions", "controller")
+"""Packages whose code decides what a run gives."""
+LIBRARIES = ("mujoco", "pin", "placo", "proxsuite", "numpy")
+_SHOWN = 12
+"""Digits of a digest that are kept."""
+
+
+def digest(content: bytes) -> str:
+    """A short name for ``content``, which nothing else has."""
+    return hashlib.sha256(content).hexdigest()[:_SHOWN]
+
+
+def code_digest(root: Path = ROOT, packages: Sequence[str] = SOURCES) -> str:
+    """A short name for the code of the packages in ``root``."""
+    code = hashlib.sha256()
+    for file in sorted(file for name in packages for file in (root / name).rglob("*.py")):
+        code.update(file.relative_to(root).as_posix().encode() + b"\0" + file.read_bytes())
+    return code.hexdigest()[:_SHOWN]
+
+
+def identity(root: Path = ROOT, packages: Sequence[str] = SOURCES) -> dict[str, str]:
+    """What results depend on besides what was run: two runs that agree in it give equal rows."""
+    return {
+        "version": importlib.metadata.version("go2-wbc"),
+        "python": platform.python_version(),
+        "libraries": ", ".join(f"{n} {importlib.metadata.version(n)}" for n in LIBRARIES),
+        "code": code_digest(root, packages),
+    }
+
 
 FORMS = (
     "a motion (a name of the library, FILE.py[:NAME], a saved FILE.json or FILE.plan), "
@@ -235,7 +272,7 @@ def _function(word: str, place: str, name: str) -> Target:
 
 
 def _gait(word: str, rest: str) -> Target:
-    from controller.sweeps.studies import GaitStudy
+    from controller.sweeps.trials import GaitStudy
     from go2_wbc.contacts import find_gait
     from go2_wbc.planning.command import VelocityCommand
 
@@ -246,7 +283,7 @@ def _gait(word: str, rest: str) -> Target:
 
 
 def _push(word: str, rest: str) -> Target:
-    from controller.sweeps.studies import PushStudy
+    from controller.sweeps.trials import PushStudy
 
     impulse, _, speed = rest.partition("@")
     (newton_seconds,) = _numbers(word, impulse, 1)

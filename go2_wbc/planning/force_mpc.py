@@ -21,7 +21,7 @@ from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
 from go2_wbc.planning.footholds import foothold, nominal_feet
 from go2_wbc.planning.gait_clock import Clock
-from go2_wbc.planning.ground import ground_at, haste, tilt
+from go2_wbc.planning.ground import ground_at, haste, is_rough, on_leash, tilt
 from go2_wbc.planning.mpc import INTERVAL, NODES, STEP, Horizon, solve_mpc
 from go2_wbc.planning.trunk import Command, advance_pose, pose_turn, ramp
 from go2_wbc.planning.walk import Planner, Walk
@@ -92,7 +92,8 @@ def fill_goals(s: Planner, c: Walk, command: Command) -> None:
         goals[k, 2], goals[k, 8] = yaw - s.trunk.yaw, velocity[2]
         goals[k, 3], goals[k, 4] = x, y
         goals[k, 0], goals[k, 1] = share * b, -share * a
-        goals[k, 5] = ground_at(s.ground, x, y) + c.height + s.trunk.height_offset
+        goals[k, 5] = ground_at(s.ground, x, y) + c.height + s.sight.lift
+        goals[k, 5] += s.trunk.height_offset
         goals[k, 11] = s.ground.slope[0] * goals[k, 9] + s.ground.slope[1] * goals[k, 10]
 
 
@@ -163,7 +164,7 @@ def fill_arms(now: Snapshot, s: Planner, c: Walk) -> None:
     for leg in range(4):
         remaining = max(landings[0, leg], 0.0) * period
         foothold(leg, now, s, c, nominal, remaining, goal)
-        footholds[leg] = goal[:2]
+        footholds[leg] = s.feet[leg].step.goal[:2] if s.feet[leg].step.is_sighted else goal[:2]
     here_x, here_y = s.trunk.position[0], s.trunk.position[1]
     before_x, before_y = here_x, here_y
     excess_x, excess_y = excess_velocity(now, s, c)
@@ -186,6 +187,8 @@ def fill_arms(now: Snapshot, s: Planner, c: Walk) -> None:
                 arm[0] = footholds[leg, 0] - com[0] - way_x
                 arm[1] = footholds[leg, 1] - com[1] - way_y
                 arm[2] = ground_at(s.ground, footholds[leg, 0], footholds[leg, 1]) - com[2]
+                if s.feet[leg].step.is_sighted:
+                    arm[2] = s.feet[leg].step.goal[2] - c.foot_radius - com[2]
             else:
                 yaw = s.trunk.yaw + rate * wait
                 cosine, sine = np.cos(yaw), np.sin(yaw)
@@ -217,6 +220,8 @@ def look_ahead(now: Snapshot, s: Planner, c: Walk, command: Command) -> None:
     fill_contacts(s.clock, s.horizon)
     fill_arms(now, s, c)
     lean_goals(s, c, command)
+    for k in range(NODES):
+        s.horizon.goals[k, 5] = on_leash(s.ground, c.config.rough, s.horizon.goals[k, 5], now)
 
 
 @subroutine
@@ -264,4 +269,5 @@ def apply_force_plan(now: Snapshot, s: Planner, c: Walk, command: Command, targe
     target.a_world[2] -= c.gravity
     target.force_weight = mpc.prior_weight
     x, y = excess_velocity(now, s, c)
-    target.orientation_discount = np.hypot(x, y) / mpc.throw_speed
+    ease = c.config.rough.ease if is_rough(s.ground) else 0.0
+    target.orientation_discount = max(np.hypot(x, y) / mpc.throw_speed, ease)

@@ -35,6 +35,8 @@ WIDTH_RATE = 2.0
 DUTY_FALL = 4.0
 """Greatest fall [1/s] of the duty of a robot that has been thrown: a foot that lifts off sooner
 is not put back. At 0.5 a push of 50 N s ahead threw a trot of 0.5 m/s over feet that stood on."""
+SEEN_STRIDE = Stride(reach=0.25, stance_min=0.25, stance_max=0.25, swing=0.25, swing_slope=0.0)
+"""Of a trot on uneven ground that is seen."""
 Phases = tuple[float, float, float, float]
 """At which the feet touch down, of FL, FR, RL and RR."""
 _RESOLUTION = 1e12
@@ -65,6 +67,7 @@ class Cadence:
         rest: the one in which the robot starts and comes to rest.
         stride: how period and duty follow the speed.
         rough_stride: the same on rough ground.
+        seen_stride: the same on uneven ground that is seen.
         follows_speed: whether they do.
     """
 
@@ -72,6 +75,7 @@ class Cadence:
     rest: GaitForm
     stride: Stride
     rough_stride: Stride
+    seen_stride: Stride
     follows_speed: bool
 
     @staticmethod
@@ -81,7 +85,7 @@ class Cadence:
         longest = max(min(stride.stance_max, c.stance), stride.stance_min)
         on_rough = replace(stride, swing=stride.swing + c.swing, stance_max=longest)
         forms = GaitForm.of(gait), GaitForm.of(rest)
-        return Cadence(*forms, stride, on_rough, gait.stride is not None)
+        return Cadence(*forms, stride, on_rough, SEEN_STRIDE, gait.stride is not None)
 
 
 class Clock(Record):
@@ -92,6 +96,7 @@ class Clock(Record):
         period, duty, offsets, width: form of the gait as it is now.
         goal: offsets to which those of now were aligned.
         is_rough: whether its strides are those on rough ground.
+        is_seen: whether they are those on uneven ground that is seen.
     """
 
     time: float
@@ -101,6 +106,7 @@ class Clock(Record):
     width: float
     goal: Float[np.ndarray, "4"]
     is_rough: bool
+    is_seen: bool
 
 
 def resting_gait(gait: Gait) -> Gait:
@@ -199,7 +205,10 @@ def adapt(
     elif c.follows_speed:
         if is_thrown:
             fall, hurries = DUTY_FALL, True
-        period, duty = stride_at(c.rough_stride if clock.is_rough else c.stride, speed)
+        if clock.is_seen:
+            period, duty = stride_at(c.seen_stride, speed)
+        else:
+            period, duty = stride_at(c.rough_stride if clock.is_rough else c.stride, speed)
     if differ(offsets, clock.goal):
         align(clock, offsets)
     left = abs(clock.period - period) / PERIOD_RATE

@@ -40,8 +40,10 @@ from go2_wbc.planning.ground import (
     level_friction,
     note_stumble,
     observe_slip,
+    on_leash,
     slow_down,
 )
+from go2_wbc.planning.height_map import HeightMap
 from go2_wbc.planning.rest import (
     come_to_rest,
     is_square,
@@ -51,6 +53,8 @@ from go2_wbc.planning.rest import (
     start_stepping,
     why_not_resting,
 )
+from go2_wbc.planning.sight import Sight, look, steps_by_sight
+from go2_wbc.planning.sighted_steps import height_to_land, swing_by_sight
 from go2_wbc.planning.swing import (
     FootContact,
     Swing,
@@ -120,7 +124,7 @@ def adapt_gait(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) 
     is_thrown = thrown > speed
     speed = max(thrown, speed) + arm * abs(s.trunk.velocity[2])
     is_resting = is_zero(command) and is_settled(s.trunk)
-    s.clock.is_rough = is_rough(s.ground)
+    s.clock.is_rough, s.clock.is_seen = is_rough(s.ground), steps_by_sight(s.sight)
     adapt(s.clock, c.cadence, dt, speed, is_resting, is_thrown)
 
 
@@ -137,7 +141,7 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
     else:
         rest_in_place(now, s, config.position_leash, dt)
     carry_ground(s.ground, config.rough, now, dt)
-    correct_height(trunk, now, s.ground.height + c.height, dt)
+    correct_height(trunk, now, s.ground.height + (c.height + s.sight.lift), dt)
 
 
 @subroutine
@@ -155,6 +159,7 @@ def note_liftoffs(
         foot = s.feet[leg].contact
         if foot.was_stance and not stance[leg]:
             begin_swing(s.feet[leg].swing, now.p_world_feet[leg], s.ground, c.config.rough)
+            s.feet[leg].step.is_sighted = False
         if not stance[leg]:
             foot.is_awaited = False
             is_middle = abs(progress[leg] - 0.5) <= MID_SWING + TIE
@@ -165,7 +170,11 @@ def note_liftoffs(
             met[leg] = True
             foot.is_awaited = False
         foot.was_stance = stance[leg]
+    height, a, b = s.ground.height, s.ground.slope[0], s.ground.slope[1]
     learn_ground(s.ground, now, c.foot_radius, met)
+    if s.sight.sees:
+        s.ground.height, s.ground.slope[0], s.ground.slope[1] = height, a, b
+        return
     if stumbles.any():
         note_stumble(s.ground)
     for leg in range(4):
@@ -183,6 +192,8 @@ def fill_feet(
     elapsed: Float[np.ndarray, "4"],
     remaining: Float[np.ndarray, "4"],
     target: Target,
+    m: HeightMap,
+    dt: float,
 ) -> None:
     """What each leg does, its load, and the way of a foot in the air."""
     nominal, goal, config = np.empty((4, 2)), np.empty(3), c.config
@@ -199,7 +210,11 @@ def fill_feet(
             foothold(leg, now, s, c, nominal, remaining[leg], goal)
             progress = elapsed[leg] / (elapsed[leg] + remaining[leg])
             p, v, a = target.p_world_feet[leg], target.v_world_feet[leg], target.a_world_feet[leg]
-            swing_foot(foot.swing, s.clock, config.swing, progress, goal, p, v, a)
+            if foot.step.is_sighted or (steps_by_sight(s.sight) and elapsed[leg] < dt):
+                spans = elapsed[leg], remaining[leg]
+                swing_by_sight(leg, now, s, c, m, spans, goal, dt, p, v, a)
+            else:
+                swing_foot(foot.swing, s.clock, config.swing, progress, goal, p, v, a)
         target.normal_force_min[leg] = config.normal_force_min * share
         target.normal_force_max[leg] = config.normal_force_max * share
 
@@ -214,16 +229,22 @@ def plan(
     c: Walk,
     command: Command,
     target: Target,
+    m: HeightMap,
 ) -> None:
     """Bring the state to ``time`` and fill the reference of this tick.
 
-    ``contact`` are the feet in measured contact, ``tau`` [N m] the measured torques.
+    ``contact`` are the feet in measured contact, ``tau`` [N m] the measured torques, ``m`` what is
+    known of the ground.
     """
     dt = time - s.time
     s.time = time
+    if m.is_used:
+        look(s.sight, s.ground, m, now, s.trunk.yaw, command.velocity, dt)
     slow_down(s.ground, c.config.rough, s.delay, command.velocity)
     advance_phase(now, s, c, command, dt)
     integrate(now, s, c, command, dt)
+    if s.sight.sees:
+        s.ground.rough_way = s.ground.high_way = 0.0
     if s.is_stepping:
         adapt_gait(now, s, c, command, dt)
     stance, stands = np.ones(4, dtype=np.bool_), np.ones(4, dtype=np.bool_)
@@ -235,14 +256,17 @@ def plan(
             progress[leg] = elapsed[leg] / (elapsed[leg] + remaining[leg])
         foot, p = s.feet[leg].contact, now.p_world_feet[leg]
         above = p[2] - c.foot_radius - ground_at(s.ground, p[0], p[1])
+        if s.feet[leg].step.is_sighted:
+            above = height_to_land(m, p[0], p[1], p[2] - c.foot_radius)
         stands[leg] = follow_contact(foot, above, contact[leg], stance[leg], progress[leg], dt)
     steps, beside = s.is_stepping, c.stands_beside_com
     observe_slip(s.slip, now, contact, tau, stands, steps, beside, dt)
     note_liftoffs(now, s, c, contact, stance, progress)
     target.friction = level_friction(s.ground, s.slip.friction, LEAST_FRICTION)
-    fill_body(s.trunk, s.ground, c.height, target)
+    fill_body(s.trunk, s.ground, c.height + s.sight.lift, target)
+    target.p_world[2] = on_leash(s.ground, c.config.rough, target.p_world[2], now)
     level(s.trunk, now, contact, s.is_stepping, dt, target)
-    fill_feet(now, s, c, stance, stands, elapsed, remaining, target)
+    fill_feet(now, s, c, stance, stands, elapsed, remaining, target, m, dt)
     target.q_joints[:] = now.q[7:]
     if s.is_stepping:
         apply_force_plan(now, s, c, command, target)
@@ -252,9 +276,19 @@ class LocomotionPlanner:
     """Turns a velocity command into references, one tick after the other."""
 
     @typed()
-    def __init__(self, model: RobotModel, gait: Gait, config: LocomotionConfig) -> None:
-        """Prepare a planner; ``start`` sets it on its way."""
+    def __init__(
+        self,
+        model: RobotModel,
+        gait: Gait,
+        config: LocomotionConfig,
+        heights: HeightMap | None = None,
+    ) -> None:
+        """Prepare a planner; ``start`` sets it on its way.
+
+        ``heights``: of the ground, as they are known at each tick; None for a robot that is blind.
+        """
         self._model, self._config = model, config
+        self._heights = HeightMap() if heights is None else heights
         self._state, self._command = Planner(), Command()
         self.change_gait(gait)
 
@@ -324,6 +358,11 @@ class LocomotionPlanner:
         return bool(self._state.delay >= LATE)
 
     @property
+    def sight(self) -> Sight:
+        """What has been seen of the way."""
+        return self._state.sight
+
+    @property
     def is_stepping(self) -> bool:
         """Whether the gait is running; not before ``start``."""
         return self._state.is_stepping
@@ -377,5 +416,6 @@ class LocomotionPlanner:
         velocity = command.linear_x, command.linear_y, command.angular_z
         asked.row[:] = *velocity, pose.height, pose.roll, pose.pitch, pose.yaw
         contact, tau = state.feet_in_contact, state.tau
-        plan(snapshot, state.time, contact, tau, self._state, self._walk, asked, target)
+        own = self._state, self._walk, asked, target, self._heights
+        plan(snapshot, state.time, contact, tau, *own)
         return Reference.of_row(target.row)

@@ -130,6 +130,29 @@ class Swing(Record):
     begun: float
 
 
+class Step(Record):
+    """Where and how a foot swings that is placed by sight; see ``sighted_steps``.
+
+    Attributes:
+        is_sighted: whether this swing is.
+        next: when [s] the foothold is chosen again.
+        chosen: the foothold, for the centre of the foot [m].
+        goal: where the foot is led, on its way there [m].
+        top: greatest height of the swing [m].
+        peak: share of the swing at which it is there.
+        begin, end: shares between which the foot goes ahead.
+    """
+
+    is_sighted: bool
+    next: float
+    chosen: Array3
+    goal: Array3
+    top: float
+    peak: float
+    begin: float
+    end: float
+
+
 @subroutine
 def begin_swing(swing: Swing, p_foot: Array3, ground: Ground, c: RoughConfig) -> None:
     """A foot leaves the ground."""

@@ -13,9 +13,11 @@ from go2_wbc.planning import ground, swing
 from go2_wbc.planning.gait_clock import Cadence, Clock
 from go2_wbc.planning.ground import Ground, RoughConfig, Slip
 from go2_wbc.planning.mpc import Horizon, MpcConfig
-from go2_wbc.planning.swing import FootContact, Swing, SwingConfig
+from go2_wbc.planning.sight import Sight
+from go2_wbc.planning.swing import FootContact, Step, Swing, SwingConfig
 from go2_wbc.planning.trunk import PoseConfig, Trunk
 from go2_wbc.records import Record
+from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Retired, past_table, ranged, retires
 
@@ -140,6 +142,8 @@ class Walk:
         foot_radius: [m].
         p_base_feet_nominal: places of the feet below the hips, from the base [m].
         stands_beside_com: whether at times only the feet of one side, or of one end, stand.
+        p_base_hips: where the thighs' axes meet the legs' planes, in the base frame [m].
+        link: length of a thigh, and of a calf [m].
     """
 
     config: LocomotionConfig
@@ -150,10 +154,13 @@ class Walk:
     foot_radius: float
     p_base_feet_nominal: Float[np.ndarray, "4 3"]
     stands_beside_com: bool
+    p_base_hips: Float[np.ndarray, "4 3"]
+    link: float
 
     @staticmethod
     def of(model: RobotModel, gait: Gait, config: LocomotionConfig) -> Walk:
         """Those of a robot that walks with ``gait``."""
+        legs = leg_table(model).geometry
         return Walk(
             replace(config, swing=config.swing.at_most(gait.apex)),
             Cadence.of(gait, config.rough),
@@ -163,14 +170,17 @@ class Walk:
             model.foot_radius,
             model.p_base_feet_nominal,
             gait.stands_beside_com,
+            np.array([leg.p_base_hip + [0.0, leg.width, 0.0] for leg in legs]),
+            0.5 * (legs[0].thigh + legs[0].calf),
         )
 
 
 class Foot(Record):
-    """What the planner remembers of a foot: its contact and its swing."""
+    """What the planner remembers of a foot: its contact, its swing, and that by sight."""
 
     contact: FootContact
     swing: Swing
+    step: Step
 
 
 class Rest(Record):
@@ -220,3 +230,4 @@ class Planner(Record):
     feet: tuple[Foot, Foot, Foot, Foot]
     planned: PlannedForces
     horizon: Horizon
+    sight: Sight

@@ -3,9 +3,26 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 
+from go2_wbc.records import ArrayNx3
 from go2_wbc.robot.profile import GO2
 from go2_wbc.robot.state import JointCommand, PartFault, RobotState
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """What a range sensor has met around the robot; what it sees of the robot itself is left out.
+
+    Attributes:
+        time: plant time [s] at which it was taken.
+        p_base_points: where its rays have met something, in the base frame [m].
+        deviation: standard deviation of a point's height [m].
+    """
+
+    time: float
+    p_base_points: ArrayNx3
+    deviation: float
 
 
 class Plant(ABC):
@@ -66,6 +83,10 @@ class Plant(ABC):
         Raises:
             PlantTimeout: if the plant stopped answering.
         """
+
+    def scan(self) -> Scan | None:
+        """The newest scan of the ground, once; None until there is another, or without a sensor."""
+        return None
 
     @abstractmethod
     def write(self, command: JointCommand) -> None:

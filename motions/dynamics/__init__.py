@@ -11,12 +11,10 @@ from typing import TYPE_CHECKING
 from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from motions.dynamics.curves import pieces
-    from motions.dynamics.dynamic_trajectory import DynamicTrajectory, Miss
+    from motions.dynamics.dynamic_trajectory import DynamicTrajectory, Miss, pieces
     from motions.dynamics.phases import FullState, Phase, PhaseProblem, Tolerance
-    from motions.dynamics.plan_audit import Reading, audit
+    from motions.dynamics.plan_audit import PlanLimits, Reading, audit
     from motions.dynamics.plan_cache import solve_cached
-    from motions.dynamics.plan_limits import PlanLimits
     from motions.dynamics.solver import Solved, solve
 
 __all__ = [

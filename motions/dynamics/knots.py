@@ -15,13 +15,14 @@ from jaxtyping import Bool, Float
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from go2_wbc.legs import LEGS
+from go2_wbc.recording import true_runs
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rpy_from_rotation, yaw_rotation
 from motions.batch_kinematics import attitudes, configurations, foot_centres, turned_back
 from motions.dynamics.phases import GRAVITY, KNOT_PERIOD, FullState, Phase, PhaseProblem
-from motions.dynamics.plan_limits import PlanLimits
+from motions.dynamics.plan_audit import PlanLimits
 from motions.postures import standing_feet, standing_on
 
 LEAD = 0.2
@@ -168,7 +169,7 @@ def _trunk_path(
     """
     first, last = (pose_of(state.q) for state in ends)
     origin = Anchor.of_feet(p_feet, 0.0)
-    flights = true_spans(np.logical_not(stance.any(axis=1)))
+    flights = [(run.start, run.stop) for run in true_runs(np.logical_not(stance.any(axis=1)))]
     edges = {knot for span in flights for knot in span}
     known = [goal for goal in goals if goal.pose is not None or goal.knot in edges]
     known += [goals[-1]] if goals[-1] not in known else []
@@ -237,12 +238,6 @@ def _over_feet(
     return pose
 
 
-def true_spans(mask: Bool[np.ndarray, " n"]) -> list[tuple[int, int]]:
-    """First row of every run of True, and the row after it."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
-
-
 def _foot_paths(
     times: Float[np.ndarray, " n1"],
     goals: tuple[Goal, ...],
@@ -272,8 +267,8 @@ def _clearances(
     """The least heights of the feet's centres: on the ground, and higher once under way."""
     least = np.full((len(stance) + 1, 4), model.foot_radius)
     for leg in LEGS:
-        for begin, end in true_spans(~stance[:, leg]):
-            least[begin + 2 : end - 1, leg] += limits.clearance
+        for flight in true_runs(~stance[:, leg]):
+            least[flight.start + 2 : flight.stop - 1, leg] += limits.clearance
     return least
 
 

@@ -22,7 +22,7 @@ from go2_wbc.files import write_atomically
 from go2_wbc.robot.model import RobotModel
 from motions.dynamics.dynamic_trajectory import DynamicTrajectory
 from motions.dynamics.phases import PhaseProblem, Progress, Tolerance
-from motions.dynamics.plan_limits import PlanLimits
+from motions.dynamics.plan_audit import PlanLimits
 from motions.dynamics.projection import PlanTarget, nearest
 from motions.dynamics.solver import accept, solve
 

@@ -18,7 +18,7 @@ from go2_wbc.robot.model import RobotModel
 from motions.dynamics.dynamic_trajectory import DynamicTrajectory, Miss
 from motions.dynamics.knots import Goal, Knots, feet_at, guess_velocities
 from motions.dynamics.phases import KNOT_PERIOD, LONGEST_PHASE, FullState, Progress, Tolerance
-from motions.dynamics.plan_limits import PlanLimits, Weights
+from motions.dynamics.plan_audit import PlanLimits, Weights
 from motions.dynamics.solver import BUDGET, Task, optimum, trunk_miss
 
 TRACKING = (300.0, 100.0, 1000.0)

@@ -20,7 +20,7 @@ from go2_wbc.robot.rotations import quaternion_from_rpy
 from go2_wbc.robot.state import RobotState
 from motions.dynamics.knots import Goal, Knots
 from motions.dynamics.phases import FullState
-from motions.dynamics.plan_limits import PlanLimits, Weights
+from motions.dynamics.plan_audit import PlanLimits, Weights
 
 FACETS = 8
 """Of the friction cone; four outside it let 0.61 pass for 0.5, eight inside it keep 0.50."""

@@ -18,8 +18,7 @@ from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 from motions.dynamics.dynamic_trajectory import DynamicTrajectory, Miss
 from motions.dynamics.knots import Knots, Solution, feet_at, knots_of, pose_of
 from motions.dynamics.phases import PhaseProblem, Progress, Tolerance
-from motions.dynamics.plan_audit import audit
-from motions.dynamics.plan_limits import PlanLimits, Weights
+from motions.dynamics.plan_audit import PlanLimits, Weights, audit
 
 BUDGET = 20.0
 """Processor time [s] that solving may take."""

@@ -16,18 +16,16 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Bool, Float
 
+from go2_wbc.recording import true_runs
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
-from motions.dynamics.curves import centred, feet_at
-from motions.dynamics.dynamic_trajectory import BALANCING_FEET
-from motions.dynamics.knots import true_spans
+from motions.dynamics.dynamic_trajectory import BALANCING_FEET, centred, feet_at
 from motions.dynamics.plan_audit import defects, drift
 from motions.feasibility.case import FEET, JOINTS, Case, Forces
 from motions.feasibility.forces import PRESSED
 from motions.feasibility.goal_errors import Misses, misses_of
 from motions.feasibility.report import Series
-from motions.plan.compiled_plan import LEAST_FEET, CompiledPlan
-from motions.plan.dynamic_span import DynamicSpan
+from motions.plan.compiled_plan import LEAST_FEET, CompiledPlan, DynamicSpan
 from motions.plan.trajectory import Trajectory
 
 _ROWS = (*(f"trunk {axis}" for axis in ("x", "y", "z", "roll", "pitch", "yaw")), *JOINTS)
@@ -176,7 +174,8 @@ class _Judge:
         feet, events = contacts.modes.sum(axis=1), np.append(contacts.times, np.inf)
         times = self.span.start + self.span.trajectory.times
         since = np.zeros((len(times), 1))
-        for start, end in true_spans((feet > 0) & (feet <= BALANCING_FEET)):
+        for few in true_runs((feet > 0) & (feet <= BALANCING_FEET)):
+            start, end = few.start, few.stop
             first = max([row for row in range(start) if feet[row] < LEAST_FEET], default=-1) + 1
             if events[start] - events[first] < SETTLING:
                 inside = (times >= events[start]) & (times < events[end])

@@ -12,11 +12,10 @@ from go2_wbc.legs import FOOT_NAMES, LEGS, Leg
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
-from motions.dynamics.curves import feet_at
+from motions.dynamics.dynamic_trajectory import feet_at
 from motions.dynamics.phases import PhaseProblem
 from motions.dynamics.projection import PlanTarget
-from motions.plan.compiled_plan import CompiledPlan
-from motions.plan.dynamic_span import DynamicSpan, attitude_angles
+from motions.plan.compiled_plan import CompiledPlan, DynamicSpan, attitude_angles
 
 SUBJECTS = ("trunk", *FOOT_NAMES)
 _Places = Float[np.ndarray, "n1 4 3"]

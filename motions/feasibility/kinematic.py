@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float
 
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.motion_plan import MotionPlan, Posture
+from go2_wbc.recording import true_runs
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
 from go2_wbc.robot.model import RobotModel
@@ -20,7 +21,7 @@ from motions.batch_kinematics import attitudes, foot_centres
 from motions.feasibility.bodies import LinkHulls
 from motions.feasibility.case import FEET, JOINTS, Case
 from motions.feasibility.report import Series
-from motions.plan.trajectory import Trajectory, runs
+from motions.plan.trajectory import Trajectory
 from motions.postures import home_poses
 
 ENDS = ("entry", "exit")
@@ -80,7 +81,7 @@ def joint_position(case: Case) -> Series:
 def _brief(mask: Bool[np.ndarray, " n"], motion: Trajectory, most: float) -> Bool[np.ndarray, " n"]:
     """The rows of ``mask`` that are True for no longer than ``most`` [s] at a time."""
     kept = mask.copy()
-    for rows in runs(mask):
+    for rows in true_runs(mask):
         kept[rows] &= motion.times[rows.stop - 1] - motion.times[rows.start] <= most
     return kept
 

@@ -13,8 +13,6 @@ from go2_wbc.legs import Leg
 from go2_wbc.validation import LARGEST
 from motions import arguments
 from motions.arguments import is_number, positive, quantity
-from motions.language.clock import LEAST_BEAT, SAME, BeatClock
-from motions.language.easing import backwards
 from motions.language.keys import (
     ON_GROUND,
     BalanceShift,
@@ -27,8 +25,9 @@ from motions.language.keys import (
     PhaseKey,
     PostureKey,
     StepKey,
+    backwards,
 )
-from motions.language.timeline_data import TimelineData, distinct
+from motions.language.timeline_data import LEAST_BEAT, SAME, BeatClock, TimelineData, distinct
 
 SLOWEST, FASTEST = 1.0, 60.0 / LEAST_BEAT
 """Beats a minute of a tempo: own choice, nobody counts slower or faster."""

@@ -14,19 +14,20 @@ from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import Posture
 from motions import arguments
 from motions.arguments import is_number, positive, quantity, word
-from motions.language.easing import EaseWord, easing
 from motions.language.keys import (
     BODY_CHANNELS,
     ON_GROUND,
     BalanceShift,
     BodyKey,
     BodyPathKey,
+    EaseWord,
     Frame,
     JointKey,
     Key,
     LegKey,
     LegTarget,
     PostureKey,
+    easing,
 )
 from motions.language.timeline_data import TimelineData
 

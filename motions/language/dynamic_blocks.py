@@ -21,9 +21,8 @@ from motions import arguments
 from motions.arguments import positive, quantity
 from motions.dynamics import phase_builders as build
 from motions.dynamics.phases import BODY_COORDINATES, Phase
-from motions.language.clock import SAME, BeatClock
 from motions.language.keys import PhaseKey, PostureKey
-from motions.language.timeline_data import TimelineData
+from motions.language.timeline_data import SAME, BeatClock, TimelineData
 
 _Place = tuple[float, float, float]
 _LOW = (-0.03, 0.0, -0.09, 0.0, 0.1, 0.0)

@@ -120,14 +120,6 @@ class Footing:
         """Where the feet's centres are when all steps are done [m]."""
         return self._feet_at(np.inf)
 
-    @property
-    def end_pose(self) -> tuple[float, float, float]:
-        """x, y [m] and yaw [rad] of the frame of the feet when all steps are done."""
-        p_feet = self._feet_at(np.inf)
-        frame = Anchor.of_feet(p_feet, 0.0)
-        x, y, _ = frame.p_world.tolist()
-        return x, y, frame.yaw
-
     def steps_back(self, end: float) -> dict[StepKey, StepKey]:
         """For every step the one back, of the motion that is this one backwards.
 

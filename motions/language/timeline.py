@@ -29,11 +29,11 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from motions.language.arrangement import Arrangement
 from motions.language.body_and_feet import BodyAndFeet
-from motions.language.clock import SAME
 from motions.language.dynamic_blocks import DynamicBlocks
 from motions.language.footing import Footing
 from motions.language.keys import PhaseKey, StepKey
 from motions.language.steps import Steps
+from motions.language.timeline_data import SAME
 from motions.postures import standing_feet
 
 
@@ -54,7 +54,7 @@ class Timeline(BodyAndFeet, Steps, DynamicBlocks, Arrangement):
             feet = Footing(self._between(start, block.start), nominal, feet).end
             heading = yaw_rotation(Anchor.of_feet(feet, 0.0).yaw)
             feet, start = feet + block.shift @ heading.T, block.end
-        return Footing(self._between(start, math.inf), nominal, feet).end_pose
+        return Anchor.of_feet(Footing(self._between(start, math.inf), nominal, feet).end, 0.0).pose
 
     def reverse(self) -> Timeline:
         """The same motion backwards; it must end at home, with its feet below their hips.

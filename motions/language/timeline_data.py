@@ -1,4 +1,4 @@
-"""What a timeline is made of, and how calls add to it: keys, a cursor, a tempo.
+"""What a timeline is made of, and how calls add to it: keys, a cursor, beats as a measure of time.
 
 The classes beside this one hold the calls that authors make; ``Timeline`` has them all.
 """
@@ -6,8 +6,9 @@ The classes beside this one hold the calls that authors make; ``Timeline`` has t
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Self, TypeVar
 
 from go2_wbc.brief import inline_html
@@ -15,10 +16,98 @@ from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import Posture
-from motions.arguments import positive
+from motions.arguments import is_number, positive
 from motions.dynamics.phases import Tolerance
-from motions.language.clock import SAME, BeatClock
 from motions.language.keys import BODY_CHANNELS, BalanceShift, BodyKey, Key, LegKey
+
+SAME = 1e-9
+"""Times this close [s] are the same: absorbs rounding of sums."""
+LEAST_BEAT = 0.05
+"""Beats that follow closer [s] are no ruler: own choice, 1200 a minute; nobody counts so fast."""
+MOST_BEATS = 10_000
+"""Nor are more than so many: own choice, an hour at 160 a minute."""
+
+
+@dataclass(frozen=True, slots=True)
+class BeatClock:
+    """Counts in beats: straight between the instants of two, and on as the last two are apart.
+
+    Attributes:
+        instants: when [s] after the start of the motion beats 0, 1, 2 ... are; two or more.
+    """
+
+    instants: tuple[float, ...] = (0.0, 1.0)
+
+    @staticmethod
+    def steady(interval: float) -> BeatClock:
+        """A beat every ``interval`` seconds, from the start of the motion on."""
+        return BeatClock((0.0, interval))
+
+    @staticmethod
+    def of(times: Iterable[float]) -> BeatClock:
+        """Beats at these instants [s].
+
+        Raises:
+            TimelineError: unless they are two or more increasing numbers, none below 0.
+        """
+        instants = list(times)
+        for number, time in enumerate(instants):
+            if not (is_number(time) and time >= 0.0):
+                raise TimelineError(
+                    f"beat {number} must be at a time of 0 s or later, got {time!r}"
+                )
+        for number, (first, second) in enumerate(pairwise(instants)):
+            if not second - first > SAME:
+                raise TimelineError(
+                    f"beats must come one after the other: beat {number} is at {first:g} s, beat "
+                    f"{number + 1} at {second:g} s"
+                )
+        if len(instants) < 2:
+            raise TimelineError(f"a tempo needs 2 beats or more, got {len(instants)}")
+        return BeatClock(tuple(map(float, instants)))
+
+    def at(self, beat: float) -> float:
+        """When [s] ``beat`` is, at least 0; it need not be a whole one."""
+        return self.after(self.instants[0], beat)
+
+    def after(self, start: float, beats: float) -> float:
+        """When [s] ``beats`` have passed since the instant ``start`` [s]."""
+        left, now = beats, start
+        for first, second in pairwise(self.instants[:-1]):
+            if now < second - SAME:
+                share = (second - now) / (second - first)
+                if left <= share:
+                    return now + left * (second - first)
+                left, now = left - share, second
+        return now + left * (self.instants[-1] - self.instants[-2])
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether beats are evenly apart from the start on: a tempo, not a song."""
+        return len(self.instants) == 2 and self.instants[0] == 0.0
+
+    def between(self, start: float, end: float) -> tuple[float, ...]:
+        """The beats from ``start`` to ``end`` [s], both included.
+
+        Of a tempo they are counted from ``start`` on, as ``after`` counts; of a song they are where
+        they are. None if they follow each other closer than ``LEAST_BEAT``, or
+        are more than ``MOST_BEATS``.
+        """
+        first = start if self.is_steady else self.instants[0]
+        least = min(late - early for early, late in pairwise(self.instants))
+        if least < LEAST_BEAT or end - min(first, start) > MOST_BEATS * least:
+            return ()
+        gap = self.instants[-1] - self.instants[-2]
+        known = (start,) if self.is_steady else self.instants
+        more = range(1, int((end - known[-1]) / gap + 1.0) + 1)
+        times = (*known, *(known[-1] + beat * gap for beat in more))
+        return tuple(time for time in times if start - SAME <= time <= end + SAME)
+
+    def fewest(self, seconds: float) -> int:
+        """The fewest whole beats that are nowhere shorter than ``seconds``."""
+        shortest = min(second - first for first, second in pairwise(self.instants))
+        return math.ceil(seconds / shortest - SAME)
+
 
 LONGEST = 1200.0
 """Time [s] that a motion may take unless ``Timeline(longest=...)`` says more: a check of 20 minutes

@@ -8,9 +8,8 @@ from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from motions.music.beat_tracking import Beats, beats
-    from motions.music.choreography import Dance, compose, feasible_dance
+    from motions.music.choreography import Dance, DancedAccents, compose, danced, feasible_dance
     from motions.music.dance_moves import MOVES, Accent, Move
-    from motions.music.dance_timing import DancedAccents, danced
     from motions.music.songs import Song, click_track, made_song
 
 __all__ = [

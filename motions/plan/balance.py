@@ -44,9 +44,9 @@ from motions.batch_kinematics import (
     rates,
     zero_moment_points,
 )
-from motions.language.clock import SAME
 from motions.language.keys import BalanceShift
 from motions.language.timeline import Timeline
+from motions.language.timeline_data import SAME
 from motions.plan.compiled_plan import Problem
 from motions.plan.tracks import Instants, LegTracks, Poses, Times, followed
 

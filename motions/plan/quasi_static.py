@@ -20,11 +20,10 @@ from go2_wbc.errors import TimelineError
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.model import RobotModel
 from motions.batch_kinematics import centres_of_mass
-from motions.language.clock import SAME
 from motions.language.footing import Footing
 from motions.language.keys import BalanceShift, FootHold, LegKey, Mark, StepKey
 from motions.language.timeline import Timeline
-from motions.language.timeline_data import distinct
+from motions.language.timeline_data import SAME, distinct
 from motions.plan.balance import Balancer, swayed
 from motions.plan.compiled_plan import CompiledPlan, Problem, event_at
 from motions.plan.tracks import Instants, JointPaths, LegTracks, Times, body_path, sample_times

@@ -2,15 +2,19 @@
 
 Each part is made in a frame of its own, on the ground below the feet where it starts; so what
 follows a jump counts from where it lands. All of them rest standing where they meet.
+
+Where the nearest motion is asked for, parts that break a limit are cut out from rest to rest, and
+replaced by the nearest that the robot can do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy.interpolate import PPoly
 
 from go2_wbc.arguments import typed
@@ -18,6 +22,7 @@ from go2_wbc.contacts import ContactSchedule
 from go2_wbc.curves import Ease
 from go2_wbc.errors import PlanNotFound, TimelineError
 from go2_wbc.motion_plan import Posture
+from go2_wbc.recording import true_runs
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
@@ -26,16 +31,130 @@ from motions.dynamics.knots import standing
 from motions.dynamics.phases import PhaseProblem, Progress
 from motions.dynamics.plan_cache import nearest_cached, solve_cached
 from motions.dynamics.projection import PlanTarget
-from motions.language.clock import SAME
 from motions.language.dynamic_blocks import away_from_home
-from motions.language.keys import BodyKey, FootHold, Key, Mark, PhaseKey
+from motions.language.keys import BalanceShift, BodyKey, FootHold, Key, Mark, PhaseKey
 from motions.language.timeline import Timeline
-from motions.plan.compiled_plan import CompiledPlan, Problem, event_at
-from motions.plan.dynamic_span import DynamicSpan, attitude_angles, curves_of, placed
+from motions.language.timeline_data import SAME
+from motions.plan.compiled_plan import (
+    CompiledPlan,
+    DynamicSpan,
+    Problem,
+    attitude_angles,
+    curves_of,
+    event_at,
+    placed,
+)
 from motions.plan.quasi_static import UNLOAD_TIME, compile_quasi_static
-from motions.plan.repair import pieces_to_repair, without_vain_shifts
-from motions.plan.trajectory import trajectory_of
+from motions.plan.trajectory import Trajectory, trajectory_of
 from motions.postures import standing_feet
+
+LEAST_REST = 0.1
+"""Time [s] at rest from which on a motion falls into parts there: own choice. Between two poses the
+trunk rests for an instant only, and a solver that must meet it there is worse off; at home, where a
+motion ends, an instant is enough."""
+LEAD = 0.3
+"""Time [s] at rest that is solved with what follows or goes before, if there is so much: to begin a
+quick move early, and to come to rest after it. Own choice, 1.7 times sqrt(0.29 m / g)."""
+SLOW = 5e-4
+"""Way [m, rad] between two samples, at most, of what does not just pass home: 0.05 /s."""
+NEAR = 10
+"""Samples beside a rest that are as good as part of it: moves begin and end slowly."""
+SAME_POSE = 1e-4
+"""Difference [m, rad] of configurations that counts as none; splines ring by less."""
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A part of a motion, from rest to rest.
+
+    Attributes:
+        first, last: rows of its path.
+        start, end: when [s] in the motion.
+    """
+
+    first: int
+    last: int
+    start: float
+    end: float
+
+    def written(self, path: Trajectory) -> PlanTarget:
+        """What is written there; a foot that leaves at the motion's first instant stands then.
+
+        Raises:
+            PlanNotFound: if that is no motion to be near to.
+        """
+        rows = slice(self.first, self.last + 1)
+        stance = path.stance[rows].copy()
+        stance[0] |= self.first == 0
+        try:
+            return PlanTarget(path.times[rows] - self.start, path.q[rows], stance)
+        except TimelineError as error:
+            raise PlanNotFound("there is no nearest motion", [str(error)]) from error
+
+
+def without_vain_shifts(timeline: Timeline) -> Timeline:
+    """Without shifts of the trunk for two feet or more that are up at once, which cannot balance.
+
+    A shift over three feet is how balance on them is written; two have no area to be over. While
+    the second foot joins the first, what was shifted for the first one alone is as much in vain.
+    """
+    vain: list[Key] = []
+    episode: list[BalanceShift] = []
+    for shift in timeline.in_order(BalanceShift):
+        episode.append(shift)
+        if not shift.raised:
+            vain += episode if any(len(one.raised) > 1 for one in episode) else []
+            episode = []
+    vain += episode if any(len(one.raised) > 1 for one in episode) else []
+    return replace(timeline, keys=tuple(key for key in timeline.keys if key not in vain))
+
+
+def pieces_to_repair(
+    path: Trajectory, as_checked: Trajectory, broken: Float[np.ndarray, " k"]
+) -> list[Piece]:
+    """The parts of ``path``, from rest to rest, in which there are ``broken`` instants [s].
+
+    At rest ``path`` must be the same as ``as_checked``: the motion goes on from there as it is.
+    """
+    times, last = path.times, len(path.times) - 1
+    rows = np.minimum(np.searchsorted(times, broken - SAME_POSE), last)
+    edges = [(0, 0), *_rests(path, as_checked, rows), (last, last)]
+    pieces: list[Piece] = []
+    for (before, start), (end, after) in pairwise(edges):
+        if not ((rows >= start) & ((rows < end) | (end == last))).any():
+            continue
+        first = max(before, int(np.searchsorted(times, times[start] - LEAD - SAME_POSE)))
+        final = min(after, int(np.searchsorted(times, times[end] + LEAD - SAME_POSE)))
+        if pieces and first <= pieces[-1].last:
+            first = pieces.pop().first
+        pieces.append(Piece(first, final, float(times[first]), float(times[final])))
+    return pieces
+
+
+def _rests(
+    path: Trajectory, as_checked: Trajectory, broken: Int[np.ndarray, " k"]
+) -> list[tuple[int, int]]:
+    """First and last rows of every rest on four feet in which no limit is broken.
+
+    That is a while anywhere, or an instant at home.
+    """
+    is_ready = np.abs(path.q - as_checked.q).max(axis=1) < SAME_POSE
+    is_ready &= path.stance.all(axis=1) & as_checked.stance.all(axis=1)
+    steps = np.abs(np.diff(path.q, axis=0)).max(axis=1)
+    moves = np.maximum([0.0, *steps], [*steps, 0.0])
+    at_home = np.abs(path.q[:, 7:] - path.q[0, 7:]).max(axis=1) < SAME_POSE
+    rests = []
+    for rest in true_runs((steps < SAME_POSE * np.diff(path.times)) & is_ready[1:]):
+        first, last = rest.start, rest.stop
+        if path.times[last] - path.times[first] > LEAST_REST - SAME_POSE:
+            rests.append((first, last))
+            at_home[max(first - NEAR, 0) : last + NEAR] = False
+    for instants in true_runs(at_home & is_ready & (moves < SLOW)):
+        slowest = instants.start + int(np.argmin(moves[instants]))
+        is_inside = instants.start > 0 and instants.stop < len(moves)
+        rests += [(slowest, slowest)] if is_inside else []
+    return sorted((a, b) for a, b in rests if not ((broken > a) & (broken < b)).any())
+
 
 SHORTEST = 1e-6
 """Time [s] between dynamic blocks below which there is none: absorbs rounding of sums."""

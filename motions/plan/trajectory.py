@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -18,6 +17,7 @@ from jaxtyping import Bool, Float
 
 from go2_wbc.errors import MotionError
 from go2_wbc.motion_plan import MotionPlan
+from go2_wbc.recording import true_runs
 from go2_wbc.robot.model import RobotModel
 from motions.batch_kinematics import (
     angles_of,
@@ -28,8 +28,7 @@ from motions.batch_kinematics import (
     rates,
 )
 from motions.dynamics.projection import PlanTarget
-from motions.plan.compiled_plan import CompiledPlan, PlanSamples
-from motions.plan.dynamic_span import DynamicSpan
+from motions.plan.compiled_plan import CompiledPlan, DynamicSpan, PlanSamples
 from motions.plan.tracks import sample_times
 from motions.postures import standing_feet
 
@@ -84,8 +83,8 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
     spans = plan.dynamic if isinstance(plan, CompiledPlan) else ()
     is_dynamic = _are_within(times, spans)
     v, a = np.zeros((len(times), 18)), np.zeros((len(times), 18))
-    for rows in runs(is_dynamic):
-        if not is_dynamic[rows.start] and rows.stop - rows.start > 1:
+    for rows in true_runs(~is_dynamic):
+        if rows.stop - rows.start > 1:
             v[rows], a[rows] = rates(times[rows], q[rows], rpy[rows])
     greatest = asked.normal_force_max
     path = Trajectory(
@@ -127,12 +126,6 @@ def _are_within(
     for span in spans:
         within |= (times >= span.start) & (times < span.end)
     return within
-
-
-def runs(mask: Bool[np.ndarray, " n"]) -> list[slice]:
-    """Rows between changes of ``mask``."""
-    edges = [0, *(np.flatnonzero(np.diff(mask)) + 1).tolist(), len(mask)]
-    return [slice(a, b) for a, b in pairwise(edges)]
 
 
 def _fill(path: Trajectory, span: DynamicSpan, model: RobotModel) -> None:

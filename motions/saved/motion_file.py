@@ -13,7 +13,6 @@ from go2_wbc.arguments import typed
 from go2_wbc.errors import MotionFileError, TimelineError, unknown_name
 from go2_wbc.files import checked_output, write_atomically
 from motions.authoring import Motion
-from motions.language.clock import BeatClock
 from motions.language.keys import (
     BODY_CHANNELS,
     BalanceShift,
@@ -30,8 +29,8 @@ from motions.language.keys import (
     StepKey,
 )
 from motions.language.timeline import Timeline
-from motions.saved.envelope import Format, content_of, fields_of
-from motions.saved.values import Decoder, Encoder, required
+from motions.language.timeline_data import BeatClock
+from motions.saved.values import Decoder, Encoder, Format, content_of, fields_of, required
 
 MOTION_FORMAT: Final = Format("go2_wbc.motion", 1, "a saved motion", ".json")
 KINDS: Final[Mapping[str, type[Key]]] = {

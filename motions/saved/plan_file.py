@@ -14,10 +14,9 @@ from go2_wbc.errors import MotionFileError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.robot.model import RobotModel, fingerprint
 from motions.dynamics.dynamic_trajectory import UNREADABLE
-from motions.language.clock import SAME
+from motions.language.timeline_data import SAME
 from motions.plan.compiled_plan import CompiledPlan
-from motions.saved.envelope import Format, content_of, fields_of
-from motions.saved.values import Decoder, Encoder
+from motions.saved.values import Decoder, Encoder, Format, content_of, fields_of
 
 PLAN_FORMAT: Final = Format("go2_wbc.plan", 2, "a saved plan", ".plan")
 _DESCRIPTION: Final = "description"

@@ -9,7 +9,7 @@ import pytest
 from benchmarks import adversary, border
 from benchmarks.adversary import FALL, STATED, STUDIES, Search, outcome, passed
 from benchmarks.adversary_motions import COUNT, FAMILIES, Numbers
-from controller.sweeps.rows import Row
+from controller.sweeps.sweep_file import Row
 from go2_wbc.errors import TimelineError
 from motions import Timeline, deg, suggest
 

@@ -19,12 +19,11 @@ from benchmarks.feasibility import (
 )
 from benchmarks.study import IDEAL, IMU, TrialResult
 from benchmarks.validation_set.drawing import TEST, TRAIN
-from benchmarks.validation_set.physics import BORDER, PLAYS
+from benchmarks.validation_set.physics import BORDER, PLAYS, STRICT, MotionFailures
 from benchmarks.validation_set.questions import draw_name, draws
 from benchmarks.validation_set.scores import Case
 from controller.cli.common import ExitCode
 from controller.go2_controller import GO2Controller
-from controller.motion_failures import STRICT, MotionFailures
 from controller.sweeps.trials import Trial
 from go2_wbc.robot.model import RobotModel
 
@@ -138,7 +137,7 @@ def test_a_motion_is_played_with_the_sensors_that_are_asked_for(
         return object()
 
     monkeypatch.setattr(feasibility, "play", play)
-    monkeypatch.setattr(feasibility, "failures_of", lambda _run, _plan: BAD)
+    monkeypatch.setattr(feasibility, "verdicts_of", lambda _run, _plan: BAD)
     for sensors in (IMU, IDEAL):
         assert study_of(EXAM).on(sensors).run(0).notes[STRICT] == "fell"
     assert asked == [IMU, IDEAL]

@@ -22,8 +22,8 @@ from benchmarks.probability import (
 from benchmarks.probability_fit import Sample, _loss, calibration, fit
 from benchmarks.probability_runs import PAYLOAD, WORLDS, exam, mixed, runs, world_of
 from benchmarks.validation_set.drawing import TEST, TRAIN
-from controller.sweeps.rows import Row
-from motions.feasibility.probability import ProbabilityModel, Rise
+from controller.sweeps.sweep_file import Row
+from motions.feasibility.report import ProbabilityModel, Rise
 
 MODEL = ProbabilityModel({"slip": Rise(0.01, 0.0, 0.4)}, rest=3.0, leak=0.05)
 

@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 
 from benchmarks import rough
-from benchmarks.rough import CASES, STUDIES, WAYS, UnreliablePlant, Way, measure_way
+from benchmarks.rough import (
+    BARRIERS,
+    CASES,
+    SEEING,
+    STUDIES,
+    WAYS,
+    UnreliablePlant,
+    Way,
+    measure_way,
+)
 from benchmarks.study import TrialResult
 from controller.sweeps.trials import Trial
 from go2_wbc.plant.terrain import Blocks, Stairs, Terrain
@@ -64,4 +73,6 @@ def test_commands_are_late_by_what_is_drawn_or_get_lost() -> None:
 
 def test_each_study_stands_once_and_once_on_sensors() -> None:
     names = [study.name for study in STUDIES]
-    assert len(set(names)) == len(names) == 2 * (len(WAYS) + len(CASES))
+    assert (
+        len(set(names)) == len(names) == 2 * (len(WAYS) + len(CASES)) + len(SEEING) + len(BARRIERS)
+    )

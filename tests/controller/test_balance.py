@@ -12,7 +12,7 @@ from controller.behaviours.standing import (
     must_step,
     trot_against,
 )
-from controller.checks import is_standing
+from controller.modes import is_standing
 from go2_wbc.contacts import GAITS
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
@@ -120,6 +120,15 @@ def test_it_steps_where_the_capture_point_is_near_the_edge_of_the_feet(
     offset: tuple[float, float], *, steps: bool
 ) -> None:
     assert must_step(SNAPSHOT, offset) is steps
+
+
+@pytest.mark.parametrize("ground", [0.0, 1.0])
+def test_a_robot_that_has_sunk_does_not_step_wherever_its_ground_is(ground: float) -> None:
+    for sunk, steps in ((0.0, True), (0.2, False)):
+        com = SNAPSHOT.p_world_com + [0.0, 0.0, ground - sunk]
+        feet = SNAPSHOT.p_world_feet + [0.0, 0.0, ground]
+        now = SNAPSHOT.replaced(p_world_com=com, p_world_feet=feet)
+        assert must_step(now, (0.3, 0.0)) is steps
 
 
 def test_it_begins_on_the_feet_along_whose_line_it_falls() -> None:

@@ -100,6 +100,25 @@ def test_the_way_back_is_smooth_and_its_rates_are_the_derivatives(plan: Compiled
     assert not steps[-1].v_joints.any()
 
 
+@pytest.mark.parametrize(("rate", "change"), [(0.4, 0.0), (0.7, -1.0), (-0.5, 2.0)])
+def test_rates_are_those_of_a_clock_that_runs_otherwise(
+    plan: CompiledPlan, rate: float, change: float
+) -> None:
+    """By differences: d/dt p(s) = rate p', d2/dt2 p(s) = rate^2 p'' + change p'."""
+    t, h = 0.233, 1e-3
+    found = retimed(plan.at(t), rate, change)
+    before, now, after = (plan.at(t + rate * d + 0.5 * change * d**2) for d in (-h, 0.0, h))
+    for rates, accelerations, values in (
+        (found.v_joints, found.a_joints, [one.q_joints for one in (before, now, after)]),
+        (found.body.v_world, found.body.a_world, [x.body.p_world for x in (before, now, after)]),
+    ):
+        first, middle, last = values
+        assert rates == pytest.approx((last - first) / (2.0 * h), rel=1e-3, abs=1e-4)
+        expected = (last - 2.0 * middle + first) / h**2
+        assert accelerations == pytest.approx(expected, rel=2e-2, abs=1e-3)
+        assert np.abs(expected).max() > 0.02
+
+
 def test_time_that_runs_backwards_negates_velocities_only_and_forces_do_not_hold(
     plan: CompiledPlan,
 ) -> None:

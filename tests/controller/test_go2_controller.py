@@ -10,7 +10,7 @@ import pytest
 from controller import GO2Controller, Mode, Outcome
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ModeError, MotionInfeasible, StanceMismatch
-from go2_wbc.planning.envelopes import trot_of
+from go2_wbc.planning.envelopes import LADDER, trot_of
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
@@ -341,3 +341,14 @@ def test_a_gait_of_ones_own_walks(go2: GO2Controller) -> None:
     assert go2.state.q[0] > 0.8
     go2.stop()
     assert go2.last_outcome.ok
+
+
+def test_a_gait_that_is_named_stays_though_it_was_chosen_by_the_speed_before(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    with GO2Controller() as go2:
+        assert go2.stand()
+        assert go2.walk("auto")
+        assert go2.walk(LADDER[0])
+        go2.move(9.0)
+    assert f"the envelope of gait '{LADDER[0]}'" in caplog.text

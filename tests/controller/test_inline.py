@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from controller.inline import LONGEST, html_of
-from controller.sweeps.rows import Row
 from controller.sweeps.run import SweepResult
+from controller.sweeps.sweep_file import Row
 from go2_wbc import brief
 from go2_wbc.recording import Recording
 from motions import CheckedMotion, FeasibilityChecker, Timeline, load_motion

@@ -8,13 +8,17 @@ from typing import NoReturn
 import pytest
 
 from controller import jobs
-from controller.jobs import Answer, Job, JobServer
-from controller.modes import Aborted, Measurements
+from controller.jobs import Job, JobServer
+from controller.modes import Aborted, Measurements, Outcome
 from go2_wbc.errors import ModeError
 from go2_wbc.robot.state import RobotState
 from tests.controller.plants import HANG_GUARD, in_thread, lying_state
 
 PATIENCE = 0.8
+LOOKS = 5000
+"""How often, a millisecond apart, a test looks whether a job is prepared."""
+A_WHILE = 0.2
+"""Time [s] in which a thread that spins is seen to."""
 
 
 class Robot:
@@ -50,7 +54,7 @@ class Client:
 
     def __init__(self, jobs: JobServer[Robot]) -> None:
         self.jobs, self.is_accepted = jobs, False
-        self.answers: list[tuple[str, Answer]] = []
+        self.answers: list[tuple[str, Outcome]] = []
         self.answered = threading.Condition()
 
     def submit(
@@ -60,7 +64,7 @@ class Client:
         prepare: Callable[[], None] | None = None,
         begin: Callable[[], str] = lambda: "",
     ) -> None:
-        def reply(answer: Answer) -> None:
+        def reply(answer: Outcome) -> None:
             with self.answered:
                 self.answers.append((name, answer))
                 self.answered.notify_all()
@@ -68,16 +72,16 @@ class Client:
         job = Job(name, act, reply, prepare, begin)
         self.is_accepted = self.jobs.submit(job)
 
-    def does(self, name: str, act: Callable[[Job], Measurements] = lambda _job: {}) -> Answer:
+    def does(self, name: str, act: Callable[[Job], Measurements] = lambda _job: {}) -> Outcome:
         """What a job is answered that is carried out now."""
         self.submit(name, act)
         assert self.jobs.work()
         return self.only(name)
 
-    def told(self, name: str) -> list[Answer]:
+    def told(self, name: str) -> list[Outcome]:
         return [answer for told, answer in self.answers if told == name]
 
-    def only(self, name: str) -> Answer:
+    def only(self, name: str) -> Outcome:
         """The answer to this job, which has come once; waits for it."""
         with self.answered:
             assert self.answered.wait_for(lambda: self.told(name), HANG_GUARD)
@@ -143,7 +147,7 @@ def test_a_job_is_answered_after_it_was_carried_out_with_what_was_measured(
     client.submit("stand", act)
     assert client.answers == []
     assert client.jobs.work()
-    assert client.only("stand") == Answer(
+    assert client.only("stand") == Outcome(
         True, "done in 1.5 s: height [m] 0.31", 1.5, {"height [m]": 0.31}
     )
     assert client.jobs.last is client.only("stand")
@@ -169,13 +173,13 @@ def test_a_second_job_is_refused_at_once_and_the_first_goes_on(
 
 @pytest.mark.parametrize("error", [Aborted("the rump is too high"), ModeError("fallen: recover()")])
 def test_what_was_not_done_is_answered_with_the_reason(client: Client, error: Exception) -> None:
-    assert client.does("sit", failing(error)) == Answer(False, str(error), error=error)
+    assert client.does("sit", failing(error)) == Outcome(False, str(error), error=error)
 
 
 def test_a_job_that_may_not_begin_is_refused_when_its_turn_has_come(client: Client) -> None:
     client.submit("rise", failing(AssertionError("carried out")), begin=lambda: "it does not sit")
     client.jobs.work()
-    assert client.only("rise") == Answer(False, "it does not sit", is_refused=True)
+    assert client.only("rise") == Outcome(False, "it does not sit", is_refused=True)
 
 
 def test_a_bug_in_an_action_is_answered_and_the_server_goes_on(
@@ -231,8 +235,8 @@ def test_after_the_patience_what_runs_has_begun_and_what_waits_is_refused(
         assert queued.answers == []
         clock.now += 0.01
         queued.jobs.expire()
-        assert queued.only("dance") == Answer(True, "dance has begun")
-        assert queued.only("hello") == Answer(False, "hello has waited in vain", is_refused=True)
+        assert queued.only("dance") == Outcome(True, "dance has begun")
+        assert queued.only("hello") == Outcome(False, "hello has waited in vain", is_refused=True)
         queued.submit("late")
         queued.jobs.expire()
         assert queued.told("late") == []
@@ -268,6 +272,27 @@ def test_a_job_is_prepared_in_another_thread_and_carried_out_afterwards(client: 
     assert client.only("nod").ok
 
 
+def test_a_thread_of_the_server_sleeps_while_a_job_is_prepared(
+    threaded: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It would spin, and take the processor from the control loop."""
+    work, looked_in_vain = JobServer.work, threading.Event()
+
+    def noted(server: JobServer[Robot]) -> bool:
+        was_there = work(server)
+        if not was_there:
+            looked_in_vain.set()
+        return was_there
+
+    def prepare() -> None:
+        looked_in_vain.wait(A_WHILE)
+
+    monkeypatch.setattr(JobServer, "work", noted)
+    threaded.submit("nod", prepare=prepare)
+    assert threaded.only("nod").ok
+    assert not looked_in_vain.is_set()
+
+
 @pytest.mark.parametrize(
     ("error", "message"),
     [
@@ -299,8 +324,11 @@ def test_going_limp_during_the_preparation_keeps_the_job_from_beginning(
 def worked_off(client: Client) -> None:
     """Carry out the job, which a thread prepares, when that is done."""
     polled = threading.Event()
-    while not client.jobs.work():
+    for _ in range(LOOKS):
+        if client.jobs.work():
+            return
         polled.wait(0.001)
+    raise AssertionError("the job was prepared and not carried out")
 
 
 # --- calling off --------------------------------------------------------------------------------
@@ -331,7 +359,7 @@ def test_a_job_that_was_done_although_it_was_called_off_is_done(client: Client) 
         client.jobs.cancel()
         return {}
 
-    assert client.does("sit", act) == Answer(True, "done in 0.0 s")
+    assert client.does("sit", act) == Outcome(True, "done in 0.0 s")
 
 
 def test_going_limp_ends_what_runs_and_refuses_what_waits(robot: Robot, threaded: Client) -> None:
@@ -381,11 +409,11 @@ def test_at_the_end_whoever_waits_is_told_once_and_nothing_is_accepted_any_more(
     robot.time += 2.0
     for _ in range(2):
         queued.jobs.abandon("the server is ending")
-    assert queued.only("a") == Answer(False, "the server is ending", 2.0)
+    assert queued.only("a") == Outcome(False, "the server is ending", 2.0)
     assert queued.only("b").is_refused
     assert not queued.jobs.work()
     queued.submit("c")
-    assert queued.only("c") == Answer(False, "the server is ending", is_refused=True)
+    assert queued.only("c") == Outcome(False, "the server is ending", is_refused=True)
 
 
 def test_a_job_that_outlives_the_server_is_called_off_and_not_answered_again(

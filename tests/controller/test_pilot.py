@@ -4,9 +4,13 @@ import numpy as np
 import pytest
 
 from controller import GO2Controller, Mode
+from controller.behaviours.standing import Standing
+from controller.behaviours.walking import Walking
 from controller.navigation import DriveStraight, Goal, TurnInPlace
+from go2_wbc.contacts import GAITS
 from go2_wbc.errors import ModeError
 from go2_wbc.planning.command import ZERO_COMMAND
+from go2_wbc.planning.ground import MOST_FRICTION
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion
@@ -58,6 +62,20 @@ def test_a_goal_that_is_not_reached_is_not_done_and_says_how_far_it_got(
 
 
 # --- modes after failures ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("has_slid", "counted_on"), [(True, 0.15), (False, MOST_FRICTION)])
+def test_the_steps_of_a_standing_robot_count_on_what_walks_have_shown_of_ice(
+    standing: GO2Controller, has_slid: bool, counted_on: float
+) -> None:
+    pilot = standing._pilot
+    config = pilot._config.locomotion
+    walked = Walking(pilot._loop.model, GAITS["trot"], config, 0.15, has_slid)
+    pilot._walker.walking = walked
+    assert standing.stand()
+    stands = pilot._loop.behaviour
+    assert isinstance(stands, Standing)
+    assert stands._friction_of_steps == pytest.approx(counted_on)
 
 
 def test_after_a_stand_that_timed_out_the_robot_can_try_again(

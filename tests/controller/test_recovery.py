@@ -8,7 +8,7 @@ import pytest
 
 from controller import GO2Controller, Mode, recovery
 from controller.behaviours.joints import DAMPING
-from controller.checks import unfolded_legs
+from controller.modes import unfolded_legs
 from go2_wbc.legs import Leg
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel

@@ -7,17 +7,20 @@ from go2_wbc.errors import CommandError, TimelineError
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import rpy_from_rotation
 from motions import (
     CompiledPlan,
     FeasibilityChecker,
+    Timeline,
     compile_timeline,
     find_motion,
     load_motion,
     motion_names,
 )
 from motions.authoring import Choice
+from motions.language.keys import BODY_CHANNELS, BodyKey
 from motions.plan.quasi_static import LEAST_RAMP
-from tests.motions.plans import library_plan
+from tests.motions.plans import MODEL, library_plan
 
 STEP = 1e-3
 """Time [s] beside a solved part that is left out."""
@@ -134,3 +137,39 @@ def test_a_parameter_out_of_range_is_refused_by_name(
 ) -> None:
     with pytest.raises(TimelineError, match=message):
         load_motion("high_five", **values)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_the_trunk_comes_back_through_the_poses_by_which_it_went(side: str) -> None:
+    keys = load_motion("high_five", side=side).in_order(BodyKey)
+    for channel in BODY_CHANNELS:
+        goals = [0.0, *(key.value for key in keys if key.channel == channel)]
+        assert goals == goals[::-1], channel
+
+
+@pytest.mark.parametrize(("side", "leg"), [("right", Leg.FR), ("left", Leg.FL)])
+def test_it_counts_as_done_only_if_the_paw_is_held_at_its_height(side: str, leg: Leg) -> None:
+    plan = compile_timeline(load_motion("high_five", side=side, height=0.6), MODEL)
+    (held,) = plan.held_feet
+    assert (held.name, held.leg) == ("held", leg)
+    assert held.height == pytest.approx(0.6, abs=1e-6)
+    assert (held.start, held.end) == plan.spans["held"]
+    assert held.end - held.start == pytest.approx(2.0)
+    for t in (held.start, held.end):
+        assert not plan.at(t).stance[leg]
+
+
+def test_a_foot_on_the_ground_is_not_held_up() -> None:
+    with pytest.raises(TimelineError, match="foot FL must be raised"):
+        Timeline().foot("FR", z=0.05, over=0.5).hold(0.5, name="held", foot="FL")
+
+
+def test_it_looks_up_to_the_left_then_up_to_the_right_then_down() -> None:
+    plan = compile_timeline(load_motion("look_around"), RobotModel())
+    looks = [rpy_from_rotation(plan.at(t).body.R_world_base) for t in (1.15, 2.95, 4.4)]
+    (_, up_left, left), (_, up_right, right), (_, down, ahead) = looks
+    assert left > 0.2
+    assert right < -0.2
+    assert abs(ahead) < 1e-6
+    assert max(up_left, up_right) < -0.15
+    assert down > 0.2

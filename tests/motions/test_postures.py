@@ -11,16 +11,15 @@ from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.reference import LegTask, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.profile import find_profile
-from go2_wbc.robot.rotations import rotation_from_rpy
-from motions.postures import NORMAL_FORCE_MAX, PosturePlan, lie_down, rise, sit_down
+from go2_wbc.robot.rotations import rotation_from_rpy, yaw_rotation
+from motions.postures import NORMAL_FORCE_MAX, PosturePlan, lie_down, rise, sit_down, sit_raise
 from tests.engine_helpers import angular_velocity_from_rpy
 
 STAND_POSE = find_profile().stand_pose
 SIT_POSE = find_profile().sit_pose
 LIE_POSE = find_profile().lie_pose
 
-# m; with 3 cm the leg's determinant is a third of that of a leg that still moves smoothly.
-LEAST_DROP = 0.03
+LEAST_REACH = 0.025  # m, of a leg in its plane
 ROUNDING = 1e-10
 START = np.array([0.02, -0.01, 0.25, 0.05, -0.1, 0.2])
 WAYS: list[tuple[Callable[[np.ndarray], MotionPlan], np.ndarray, Posture]] = [
@@ -46,15 +45,22 @@ def test_a_way_leads_from_the_measured_pose_to_its_posture_at_rest_on_four_feet(
     assert rises.min() > -1e-9  # it does not overshoot
 
 
-def test_a_sitting_robot_keeps_its_rear_feet_below_their_hips_axes() -> None:
-    # With the feet squarely under the hips, a lower rump once took the rear feet through the
-    # hips' axes, where the legs are singular: they rattled and the robot never sat still.
-    model = RobotModel()
-    roll, pitch, yaw = SIT_POSE[3:]
+@pytest.mark.parametrize("inward", [0.0, 0.01, 0.014])
+def test_a_sitting_robot_keeps_its_rear_legs_off_the_singularity_of_their_hips(
+    inward: float,
+) -> None:
+    # Where the foot comes as close to the axis of abduction as the hip is wide, the leg is
+    # singular: lower, or on feet further inward, calves fold onto their stops and rattle.
+    model, yaw = RobotModel(), 0.8
     feet = model.p_base_feet_nominal.copy()
+    feet[:, 1] -= inward * np.sign(feet[:, 1])
     feet[:, 2] = model.foot_radius
-    p_base_feet = (feet - SIT_POSE[:3]) @ rotation_from_rpy(roll, pitch, yaw)
-    assert p_base_feet[2:, 2].max() < -LEAST_DROP
+    raised = sit_raise(feet @ yaw_rotation(yaw).T + [3.0, -2.0, 0.4], model)
+    assert (raised > 0.0) is (inward > 0.0)
+    pose = sit_down(START, raised=raised).at(10.0).body
+    p_hips_feet = (feet - pose.p_world) @ rotation_from_rpy(*SIT_POSE[3:]) - model.p_base_hips
+    distance = np.linalg.norm(p_hips_feet[2:, 1:], axis=1)
+    assert np.sqrt(distance.min() ** 2 - model.hip_width**2) > LEAST_REACH
 
 
 def test_the_stance_in_which_a_rise_starts_is_the_one_that_was_given() -> None:

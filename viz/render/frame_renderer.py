@@ -13,8 +13,7 @@ from PIL import Image, ImageDraw, ImageFont
 from go2_wbc.legs import LEGS
 from go2_wbc.recording import Recording
 from viz.content import Annotation
-from viz.render.camera import Camera
-from viz.render.framing import camera_path, heading_path, nearest_rows
+from viz.render.camera import Camera, camera_path, heading_path, nearest_rows
 from viz.render.mesh import Surface, arrow
 from viz.render.renderer import render
 from viz.render.robot_meshes import PosedRobot, visuals_of

@@ -15,8 +15,8 @@ from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.recording import Recording, Span
 from viz.content import check_recording
+from viz.render.camera import nearest_rows
 from viz.render.frame_renderer import FrameRenderer, ShotStyle
-from viz.render.framing import nearest_rows
 from viz.render.robot_meshes import PosedRobot, visuals_of
 
 FILMSTRIP_SUFFIXES = (".png",)

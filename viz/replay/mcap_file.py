@@ -18,7 +18,7 @@ from mcap.writer import Writer
 from go2_wbc.legs import JOINT_NAMES, LEGS
 from go2_wbc.recording import Recording
 from viz.render.robot_meshes import visuals_of
-from viz.replay.links import BASE, WORLD, label_starts, links_of
+from viz.replay.page_data import BASE, WORLD, label_starts, links_of
 
 DIGITS = 6
 """After the point of every number: um, urad."""

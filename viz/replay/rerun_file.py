@@ -14,7 +14,7 @@ from go2_wbc.legs import JOINT_NAMES, LEGS
 from go2_wbc.recording import Recording
 from viz.render.mesh import Surface
 from viz.render.robot_meshes import visuals_of
-from viz.replay.links import WORLD, label_starts, links_of
+from viz.replay.page_data import WORLD, label_starts, links_of
 
 APPLICATION, TIMELINE = "go2_wbc", "time"
 _FEET = [leg.name for leg in LEGS]

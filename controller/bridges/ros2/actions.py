@@ -13,7 +13,8 @@ from typing import Any
 from controller.bridges.ros2 import MOTION_ACTION
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.behaviors import Jobs, motion_job
-from controller.jobs import Answer, Job
+from controller.jobs import Job
+from controller.modes import Outcome
 
 _log = logging.getLogger(__name__)
 
@@ -61,7 +62,7 @@ class MotionActions:
         return ros.GoalResponse.REJECT
 
     def _execute(self, handle: Any) -> Any:
-        goal, answered = handle.request, concurrent.futures.Future[Answer]()
+        goal, answered = handle.request, concurrent.futures.Future[Outcome]()
         go2, reply = self._jobs.robot, answered.set_result
         self._jobs.submit(motion_job(goal.motion, goal.settings, go2, reply))
         while not concurrent.futures.wait([answered], FEEDBACK_PERIOD).done:
@@ -76,7 +77,7 @@ class MotionActions:
         progress, elapsed = float(go2.progress), float(go2.state.time - job.start)
         return ros.PlayMotion.Feedback(phase=job.phase, progress=progress, elapsed=elapsed)
 
-    def _conclude(self, handle: Any, answer: Answer) -> Any:
+    def _conclude(self, handle: Any, answer: Outcome) -> Any:
         if answer.ok:
             handle.succeed()
         elif answer.cancelled and handle.is_cancel_requested:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from controller.go2_controller import GO2Controller
-from controller.jobs import Answer, Job, JobServer, Reply
-from controller.modes import Aborted, Measurements, Mode
+from controller.jobs import Job, JobServer, Reply
+from controller.modes import Aborted, Measurements, Mode, Outcome
 from go2_wbc.errors import Go2WbcError, unknown_name
 from go2_wbc.motion_plan import MotionPlan, Posture
 from motions import find_motion
@@ -40,15 +40,15 @@ def order(jobs: Jobs, command: str, reply: Reply) -> None:
         act = ORDERS[name]
         jobs.submit(Job(name, lambda _job: _measured(jobs.robot, act), reply))
     else:
-        reply(Answer(False, unknown_name("command", command, COMMANDS)))
+        reply(Outcome(False, unknown_name("command", command, COMMANDS)))
 
 
-def _damp(jobs: Jobs) -> Answer:
+def _damp(jobs: Jobs) -> Outcome:
     try:
         jobs.damp()
     except Go2WbcError as error:
-        return Answer(False, str(error))
-    return Answer(True, f"limp; the robot is {jobs.robot.mode.value}")
+        return Outcome(False, str(error))
+    return Outcome(True, f"limp; the robot is {jobs.robot.mode.value}")
 
 
 def _stop(jobs: Jobs, reply: Reply) -> None:
@@ -57,7 +57,7 @@ def _stop(jobs: Jobs, reply: Reply) -> None:
     def ended() -> None:
         upright = go2.mode in (Mode.STANDING, Mode.SITTING, Mode.WALKING, Mode.LYING)
         name = job.name if job is not None else ""
-        reply(Answer(upright, f"{STOP}: {name} has ended; the robot is {go2.mode.value}"))
+        reply(Outcome(upright, f"{STOP}: {name} has ended; the robot is {go2.mode.value}"))
 
     if not jobs.cancel(ended):
         jobs.submit(Job(STOP, lambda _job: _measured(go2, _come_to_rest), reply))

@@ -9,9 +9,16 @@ from typing import Any
 
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.client import GO2ControllerNode
-from controller.checks import HEIGHT_TOLERANCE
-from controller.demo.report import Measurement, StepResult
-from controller.demo.steps import DEMO_STEPS, FORWARD_SPEED, FORWARD_TIME, TURN_ANGLE, DemoStep
+from controller.demo.steps import (
+    DEMO_STEPS,
+    FORWARD_SPEED,
+    FORWARD_TIME,
+    TURN_ANGLE,
+    DemoStep,
+    Measurement,
+    StepResult,
+)
+from controller.modes import HEIGHT_TOLERANCE
 from controller.navigation import HEADING_TOLERANCE
 from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import RobotState

@@ -34,7 +34,8 @@ from controller.bridges.ros2.namespace_lock import GraphWatch, lock_namespace
 from controller.bridges.ros2.states import StatePublisher
 from controller.bridges.ros2.velocity import VelocityInput
 from controller.go2_controller import GO2Controller
-from controller.jobs import Answer, JobServer, Reply
+from controller.jobs import JobServer, Reply
+from controller.modes import Outcome
 from controller.pacing import SWITCH_INTERVAL, LogThrottle, Pacer
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
@@ -253,7 +254,7 @@ class RobotNode:
             "published": self._states.counts,
             "errors": self._errors,
         }
-        reply(Answer(True, json.dumps(figures)))
+        reply(Outcome(True, json.dumps(figures)))
 
     def close(self) -> None:
         """Answer whoever waits and release everything."""
@@ -283,7 +284,7 @@ def polled_service(node: Any, kind: Any, name: str, act: Callable[[Any, Reply], 
     """Offer a service that answers ``success`` and ``message``; ``act`` is given each request."""
     service = node.create_service(kind, name, _never)
 
-    def answer(header: Any, answer: Answer) -> None:
+    def answer(header: Any, answer: Outcome) -> None:
         service.send_response(kind.Response(success=answer.ok, message=answer.reason), header)
 
     def poll() -> None:

@@ -16,11 +16,14 @@ import numpy as np
 
 from controller.behaviours.joints import DAMPING
 from controller.bridges.unitree import LOOPBACK, require_dds
-from controller.bridges.unitree.guards import GuardConfig, Guards, is_passive, require_sane
 from controller.bridges.unitree.low_level import (
+    GuardConfig,
+    Guards,
     as_it_says,
     intact_message,
+    is_passive,
     low_cmd_message,
+    require_sane,
     sensor_reading,
 )
 from controller.bridges.unitree.messages import LOW_STATE, encode_message

@@ -27,8 +27,8 @@ from controller.bridges.unitree.sport_robot import (
     SportPath,
     SportRobot,
 )
-from controller.jobs import Answer, Job, JobServer
-from controller.modes import Aborted, Measurements, Mode
+from controller.jobs import Job, JobServer
+from controller.modes import Aborted, Measurements, Mode, Outcome
 from controller.pacing import LogOnce
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
@@ -195,7 +195,7 @@ class SportService:
             perform()
             return {}
 
-        def answer(answer: Answer) -> None:
+        def answer(answer: Outcome) -> None:
             reply(_code_of(answer), "")
 
         if self._joins(api):
@@ -318,7 +318,7 @@ _MODE_OF_STATE: Final = {
 }
 
 
-def _code_of(answer: Answer) -> Code:
+def _code_of(answer: Outcome) -> Code:
     if answer.ok:
         return Code.OK
     if answer.is_refused:

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from go2_wbc.legs import JOINT_NAMES
-from go2_wbc.plant.base import Plant
+from go2_wbc.plant.base import Plant, Scan
 from go2_wbc.plant.mujoco.contacts import Contacts, foot_contacts, touches_itself
 from go2_wbc.plant.mujoco.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
@@ -111,12 +111,6 @@ class TruthRecording:
         return np.minimum(q - model.q_lower, model.q_upper - q).min(axis=1)
 
 
-def true_runs(flags: Bool[np.ndarray, " n"]) -> list[slice]:
-    """Where ``flags`` is true without a gap, in order."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
 @final
 class GroundTruth(Plant):
     """Passes everything on to a ``MujocoPlant`` and records its state since the last ``clear``.
@@ -160,6 +154,10 @@ class GroundTruth(Plant):
     def read(self) -> RobotState:
         """The measured state."""
         return self._plant.read()
+
+    def scan(self) -> Scan | None:
+        """See ``Plant.scan``."""
+        return self._plant.scan()
 
     def write(self, command: JointCommand) -> None:
         """Apply ``command`` for one control period, and record what came of it."""

@@ -110,7 +110,7 @@ def build_spec(
     for geom in spec.geoms:
         geom.friction = [friction, _TORSIONAL, _ROLLING]
     if terrain is not None:
-        _add_terrain(spec, terrain, friction)
+        add_terrain(spec, terrain, friction)
     if visuals:
         add_visuals(spec, description)
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -221,7 +221,8 @@ def add_floor(spec: mujoco.MjSpec) -> None:
     spec.worldbody.add_light(pos=[0, 0, 5], dir=[0, 0, -1], castshadow=False)
 
 
-def _add_terrain(spec: mujoco.MjSpec, terrain: Terrain, friction: float) -> None:
+def add_terrain(spec: mujoco.MjSpec, terrain: Terrain, friction: float) -> None:
+    """Adds a terrain to a floor."""
     floor = spec.geom(FLOOR)
     floor.quat, floor.pos = _quaternion(0.0, terrain.floor_pitch), [0.0, 0.0, terrain.floor_height]
     for index, block in enumerate((*terrain.blocks(), *terrain.banks())):

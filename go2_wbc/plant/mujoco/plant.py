@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 from collections import deque
 from functools import partial
 from pathlib import Path
@@ -16,14 +15,15 @@ from jaxtyping import Float
 from go2_wbc.arguments import typed
 from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, unknown_name
 from go2_wbc.legs import LEGS
-from go2_wbc.plant.base import Plant
+from go2_wbc.plant.base import Plant, Scan
 from go2_wbc.plant.faults import HELD_TIME, Faults, InjectedFault
 from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN, bin_forces, read_joints
+from go2_wbc.plant.mujoco.lidar import Lidar, LidarConfig
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
 from go2_wbc.plant.mujoco.pushes import Pushes
 from go2_wbc.plant.mujoco.settling import settle
-from go2_wbc.plant.mujoco.setup import PlantSetup, SavedPhysics, prepare
+from go2_wbc.plant.mujoco.setup import PlantSetup, SavedPhysics, command_numbers, prepare
 from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors, SensorNoise
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.records import packed
@@ -73,6 +73,7 @@ class MujocoPlant(Plant):
         robot: name of its profile: "go2", "a1" or "go1".
         visuals: also load the visual meshes (slower), for the viewer and for rendering.
         delay: time [s] after which a command acts, rounded to whole control periods.
+        lidar: whether it has one, or its numbers; only without ``mjcf``.
 
     Raises:
         ClosedError: from all calls, once it is closed.
@@ -107,9 +108,14 @@ class MujocoPlant(Plant):
         visuals: bool = False,
         delay: float = 0.0,
         keyframe: str | None = None,
+        lidar: LidarConfig | bool = False,
     ) -> None:
         if sensors not in SENSORS:
             raise ConfigError(unknown_name("sensors", sensors, SENSORS))
+        if lidar and mjcf is not None:
+            raise ConfigError(
+                "lidar is only for the built model: of an mjcf nobody knows the ground"
+            )
         setup = PlantSetup(
             mjcf=mjcf,
             urdf=urdf,
@@ -157,6 +163,9 @@ class MujocoPlant(Plant):
         self._senses: Proprioception | None = None
         self._state: RobotState | None = None
         self._imu: ImuSample | None = None
+        self._lidar: Lidar | None = None
+        if lidar:
+            self._lidar = Lidar.on(lidar, setup, (self._model, self._data))
         self.write(resting)
         self._ticks, self._data.time = 0, 0.0
         if sensors == "imu":
@@ -239,7 +248,7 @@ class MujocoPlant(Plant):
             ClosedError: after ``close()``.
         """
         self._check_open()
-        self._waiting.append(_numbers_of(command))
+        self._waiting.append(command_numbers(command))
         if len(self._waiting) > self._late:
             self._acting = self._waiting.popleft()
         model, data = self._model, self._data
@@ -261,6 +270,10 @@ class MujocoPlant(Plant):
             raised = [mujoco.mju_warningText(int(i), 0) for i in np.flatnonzero(self._warnings)]
             raise PlantError(f"physics failed at t={self.time:.3f} s: {'; '.join(raised)}")
         self._sense()
+
+    def scan(self) -> Scan | None:
+        """See ``Plant.scan``."""
+        return None if self._lidar is None else self._lidar.scan(self.time)
 
     def imu(self) -> ImuSample:
         """The inertial measurement unit's reading; its accelerometer lags by one physics step."""
@@ -396,6 +409,7 @@ class MujocoPlant(Plant):
             imu=self._imu,
             senses=None if self._senses is None else self._senses.save(),
             faults=self._faults.save(),
+            lidar=None if self._lidar is None else self._lidar.save(),
         )
 
     @typed(late=True)
@@ -415,6 +429,8 @@ class MujocoPlant(Plant):
         if self._senses is not None and saved.senses is not None:
             self._senses.restore(saved.senses)
         self._faults.restore(saved.faults)
+        if self._lidar is not None and saved.lidar is not None:
+            self._lidar.restore(saved.lidar)
 
     def close(self) -> None:
         """Ends the plant; every later call but ``close`` raises ``ClosedError``."""
@@ -472,24 +488,3 @@ class MujocoPlant(Plant):
         rows = (contact.geom, contact.efc_address, contact.dim, data.efc_force)
         bin_forces(*rows, codes, self._is_elliptic, forces)
         return forces
-
-
-def _numbers_of(command: JointCommand) -> Float[np.ndarray, "5 12"]:
-    """The numbers of a command, in the order that the motors read.
-
-    Raises:
-        CommandError: if it has a value that is not finite, or an array of the wrong shape.
-    """
-    rows = [getattr(command, name) for name in _COMMANDED]
-    for name, row in zip(_COMMANDED, rows, strict=True):
-        if row.shape != (12,):
-            raise CommandError(f"command.{name} must have shape (12,), got {row.shape}")
-    numbers = np.array(rows, dtype=float)
-    if not math.isfinite(np.vdot(numbers, numbers)):  # cheap, but huge numbers overflow
-        for name, row in zip(_COMMANDED, rows, strict=True):
-            if not np.isfinite(row).all():
-                raise CommandError(f"command.{name} is not finite: {row}")
-    return numbers
-
-
-_COMMANDED = ("tau", "q_des", "v_des", "kp", "kd")

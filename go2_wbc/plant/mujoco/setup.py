@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.arguments import typed
-from go2_wbc.errors import ConfigError, DescriptionError, ModelMismatch
+from go2_wbc.errors import CommandError, ConfigError, DescriptionError, ModelMismatch
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.mujoco.layout import MujocoLayout, find_layout, foot_geoms
 from go2_wbc.plant.mujoco.model import JointDynamics, add_payload, build_spec, finish
@@ -23,7 +23,7 @@ from go2_wbc.plant.sensors import ImuSample
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.robot.description import BASE_LINK, RobotDescription, find_description
 from go2_wbc.robot.motor import MotorModel, require_motor
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.state import JointCommand, RobotState
 from go2_wbc.validation import FINITE, NOT_NEGATIVE, POSITIVE, between, ranged
 from go2_wbc.world import RANGES
 
@@ -100,6 +100,7 @@ class SavedPhysics(NamedTuple):
     imu: ImuSample | None
     senses: Mapping[str, Any] | None
     faults: Mapping[str, Any]
+    lidar: Mapping[str, Any] | None = None
 
 
 def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout, MotorModel, RobotDescription]:
@@ -136,3 +137,24 @@ def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout, MotorModel
     layout = find_layout(spec, model, description.efforts)
     motor = MotorModel.named(setup.motor, description).with_peak(layout.torque_limits)
     return model, layout, motor, description
+
+
+def command_numbers(command: JointCommand) -> Float[np.ndarray, "5 12"]:
+    """The numbers of a command, in the order that the motors read.
+
+    Raises:
+        CommandError: if it has a value that is not finite, or an array of the wrong shape.
+    """
+    rows = [getattr(command, name) for name in _COMMANDED]
+    for name, row in zip(_COMMANDED, rows, strict=True):
+        if row.shape != (12,):
+            raise CommandError(f"command.{name} must have shape (12,), got {row.shape}")
+    numbers = np.array(rows, dtype=float)
+    if not math.isfinite(np.vdot(numbers, numbers)):  # cheap, but huge numbers overflow
+        for name, row in zip(_COMMANDED, rows, strict=True):
+            if not np.isfinite(row).all():
+                raise CommandError(f"command.{name} is not finite: {row}")
+    return numbers
+
+
+_COMMANDED = ("tau", "q_des", "v_des", "kp", "kd")

@@ -12,13 +12,14 @@ from benchmarks.validation_set.physics import (
     BORDERS,
     NEAR,
     PLAYS,
+    MotionFailures,
     play,
     read_borders,
+    verdicts_of,
     write_borders,
 )
 from benchmarks.validation_set.questions import FAMILIES, Question, draw_name, draws, questions
-from controller.motion_failures import UNPLANNED, MotionFailures, failures_of
-from controller.motion_measurement import MotionMeasurement
+from controller.motion_measurement import UNPLANNED, MotionMeasurement
 from go2_wbc.errors import ConfigError
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.robot.model import RobotModel
@@ -52,7 +53,7 @@ def plan() -> MotionPlan:
 
 
 def test_nothing_is_held_against_a_clean_run(plan: MotionPlan) -> None:
-    found = failures_of(CLEAN, plan)
+    found = verdicts_of(CLEAN, plan)
     assert found == MotionFailures((), (), (), ())
 
 
@@ -76,31 +77,31 @@ def test_nothing_is_held_against_a_clean_run(plan: MotionPlan) -> None:
 def test_what_physics_shows_is_said_in_words(
     plan: MotionPlan, run: MotionMeasurement, strict: str, lenient: str
 ) -> None:
-    found = failures_of(run, plan)
+    found = verdicts_of(run, plan)
     assert found.strict == ((strict,) if strict else ())
     assert found.lenient == ((lenient,) if lenient else ())
     assert not found.fell
 
 
 def test_a_joint_on_its_stop_counts_where_stops_are_counted(plan: MotionPlan) -> None:
-    found = failures_of(replace(CLEAN, stopped=0.3, joint_distance=-0.001), plan)
+    found = verdicts_of(replace(CLEAN, stopped=0.3, joint_distance=-0.001), plan)
     assert (found.strict, found.stops) == ((), ("on a stop 300 ms",))
 
 
 def test_a_fall_counts_by_every_definition(plan: MotionPlan) -> None:
-    found = failures_of(replace(CLEAN, fall="fell at t=3.20 s"), plan)
+    found = verdicts_of(replace(CLEAN, fall="fell at t=3.20 s"), plan)
     assert found.strict == found.stops == found.lenient == found.fell == ("fell",)
 
 
 def test_a_place_out_of_reach_counts_although_the_leg_follows_its_plan() -> None:
     line = Timeline(name="too high").foot("FR", x=0.1, z=1.0, over=1.5).home(over=1.5)
-    (harm,) = failures_of(CLEAN, compile_timeline(line, RobotModel())).strict
+    (harm,) = verdicts_of(CLEAN, compile_timeline(line, RobotModel())).strict
     assert harm.startswith("paw")
 
 
 def test_what_was_asked_of_a_solver_and_not_planned_is_not_done(plan: MotionPlan) -> None:
     unplanned = replace(plan, problems=(Problem("dynamic plan", "trunk", 0.0),))  # type: ignore[type-var]
-    assert failures_of(CLEAN, unplanned).strict == (UNPLANNED,)
+    assert verdicts_of(CLEAN, unplanned).strict == (UNPLANNED,)
 
 
 @pytest.mark.parametrize(("name", "is_done"), [("crouch", True), ("two_feet_at_once", False)])
@@ -108,13 +109,13 @@ def test_physics_decides(name: str, is_done: bool) -> None:
     family, model = FAMILIES[name], RobotModel()
     question = Question(family, 0, family.low if is_done else family.high)
     made = question.plan(model)
-    assert bool(failures_of(play(made, model, 0), made).strict) is not is_done
+    assert bool(verdicts_of(play(made, model, 0), made).strict) is not is_done
 
 
 def test_a_joint_that_physics_holds_at_its_stop_is_seen() -> None:
     question, model = Question(FAMILIES["nose_up"], 0, 2.0), RobotModel()
     plan = question.plan(model)
-    found = failures_of(play(plan, model, 0), plan)
+    found = verdicts_of(play(plan, model, 0), plan)
     assert any(why.startswith("on a stop") for why in found.stops)
     assert set(found.stops) > set(found.strict)
 

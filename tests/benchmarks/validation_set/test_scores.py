@@ -5,8 +5,9 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.validation_set.drawing import TEST, TRAIN
+from benchmarks.validation_set.physics import LENIENT, STRICT, MotionFailures
 from benchmarks.validation_set.scores import Case, Score, Share, render, scores, wrong_ones
-from controller.motion_failures import FELL, LENIENT, NOT_DONE, STRICT, UNPLANNED, MotionFailures
+from controller.motion_measurement import FELL, NOT_DONE, UNPLANNED
 
 
 def case(refused: bool, failed: bool, *, half: str = TEST, why: str = "slip 12 mm") -> Case:

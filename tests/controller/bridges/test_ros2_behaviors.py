@@ -14,8 +14,8 @@ import pytest
 from controller.bridges.ros2.behaviors import COMMANDS, Jobs, motion_job, order
 from controller.bridges.ros2.velocity import CMD_VEL_SILENCE, VelocityInput
 from controller.go2_controller import GO2Controller
-from controller.jobs import Answer, JobServer
-from controller.modes import Mode
+from controller.jobs import JobServer
+from controller.modes import Mode, Outcome
 from controller.pacing import LogThrottle
 from go2_wbc.config import Config
 from go2_wbc.errors import CommandError, ModeError
@@ -45,9 +45,9 @@ def jobs_of(go2: GO2Controller) -> Jobs:
     return JobServer(go2)
 
 
-def ordered(jobs: Jobs, command: str) -> list[Answer]:
+def ordered(jobs: Jobs, command: str) -> list[Outcome]:
     """The answers to an order, after the server has worked."""
-    answers: list[Answer] = []
+    answers: list[Outcome] = []
     order(jobs, command, answers.append)
     jobs.work()
     return answers
@@ -126,7 +126,7 @@ def test_damp_in_a_posture_ends_it() -> None:
 # --- motions ------------------------------------------------------------------------------------
 
 
-def played(go2: GO2Controller, motion: str, *settings: str) -> Answer:
+def played(go2: GO2Controller, motion: str, *settings: str) -> Outcome:
     jobs, answers, answered = jobs_of(go2), [], threading.Event()
     assert jobs.submit(motion_job(motion, settings, go2, answers.append))
     while not jobs.work():

@@ -228,7 +228,7 @@ def test_an_expected_error_is_one_message_and_an_exit_code_whatever_the_command(
     def fail(*_: object) -> int:
         raise error
 
-    monkeypatch.setattr("controller.cli.options._called", fail)
+    monkeypatch.setattr("controller.cli.common._called", fail)
     assert set(NEEDED) <= {command.name for command in cli.COMMANDS}
     for command in cli.COMMANDS:
         said = run(command.name, *NEEDED.get(command.name, "").split(), code=code)

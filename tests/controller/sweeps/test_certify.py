@@ -16,7 +16,7 @@ from controller.cli.common import ExitCode
 from controller.report_view import planned
 from controller.sweeps.certify import certified_rate, read_certificate, with_certificate
 from controller.sweeps.motion_study import world_of
-from controller.sweeps.rows import Row
+from controller.sweeps.sweep_file import Row
 from go2_wbc import World
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.world import DOUBTFUL

@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from controller.sweeps.rows import columns_of
 from controller.sweeps.summary import rate_interval, summarise
+from controller.sweeps.sweep_file import columns_of
 
 TABLE = {(0, 10): (0.0, 0.3085), (10, 10): (0.6915, 1.0), (5, 10): (0.1871, 0.8129)}
 """Clopper and Pearson's intervals at 95 %, from printed tables."""

@@ -14,7 +14,7 @@ import pytest
 
 from controller import sweep
 from controller.sweeps import Progress, read_sweep
-from controller.sweeps.rows import Row
+from controller.sweeps.sweep_file import Row
 from controller.sweeps.targets import Job, LoadedFunction
 from go2_wbc.errors import CommandError, ConfigError, SweepError
 from tests.controller.sweeps import swept

@@ -1,14 +1,35 @@
 """Trials draw what they say."""
 
+import json
+import math
+from pathlib import Path
+
 import pytest
 
+from controller import sweep
+from controller.cli.common import ExitCode
+from controller.sweeps.motion_study import MotionStudy, archive_of, replay
+from controller.sweeps.run import SweepResult
+from controller.sweeps.sweep_file import Row, SweepFile, row_of
+from controller.sweeps.targets import target_of
 from controller.sweeps.trials import (
     FRICTION_RANGE,
     MASS_RANGE,
     NOMINAL_FRICTION,
     YAW_RANGE,
+    GaitStudy,
+    PushStudy,
     Trial,
+    TrialRobot,
 )
+from go2_wbc import World
+from go2_wbc.errors import CommandError
+from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.robot.model import RobotModel
+from motions import CompiledPlan, Timeline, compile_timeline
+from tests.controller.cli.conftest import Run
+from tests.controller.sweeps import swept
+from tests.viz.page_reader import read_data
 
 
 def test_trials_draw_inside_their_ranges_and_fill_them() -> None:
@@ -41,3 +62,122 @@ def test_the_plant_of_a_trial_is_what_the_trial_says() -> None:
     assert plant.total_mass == pytest.approx(nominal_mass * trial.mass_scale, rel=1e-3)
     assert plant.read().rpy[2] == pytest.approx(trial.initial_yaw, abs=0.1)
     plant.close()
+
+
+SEEDS = 3
+SLOW_TROT = 0.05
+"""Error of the mean velocity [m/s] that is no gross mistake."""
+
+
+@pytest.fixture(scope="module")
+def dip() -> CompiledPlan:
+    """A short motion."""
+    line = Timeline(name="dip").body(z=-0.03, over=0.4).home(over=0.4)
+    return compile_timeline(line, RobotModel())
+
+
+@pytest.fixture(scope="module")
+def dips(dip: CompiledPlan, tmp_path_factory: pytest.TempPathFactory) -> SweepResult:
+    """Its rows, by two workers."""
+    out = tmp_path_factory.mktemp("dips") / "dips.sqlite"
+    return sweep(dip, SEEDS, workers=2, out=out)
+
+
+def test_a_motion_is_done_in_every_world_that_is_drawn(dips: SweepResult) -> None:
+    assert [row["ok"] for row in dips.rows] == [True] * SEEDS
+    assert len({row["friction"] for row in dips.rows}) == SEEDS
+    assert all(0.0 < float(row["tracking"]) < 0.02 for row in dips.rows)
+
+
+def test_a_row_does_not_depend_on_the_rows_before_it(
+    dips: SweepResult, dip: CompiledPlan, tmp_path: Path
+) -> None:
+    """One worker for all seeds, in order; and one that has done none before."""
+    alone = sweep(dip, 1, first_seed=SEEDS - 1, workers=1, out=tmp_path / "alone.sqlite")
+    in_a_row = sweep(dip, SEEDS, workers=1, out=tmp_path / "row.sqlite")
+    assert in_a_row.rows == dips.rows
+    assert alone.rows == dips.rows[-1:]
+
+
+def test_a_plan_is_carried_number_by_number(dip: CompiledPlan) -> None:
+    study = target_of(dip).function
+    assert isinstance(study, MotionStudy)
+    assert study.archive == archive_of(dip)
+
+
+def test_a_robot_that_does_not_get_up_is_a_row_that_says_why(dip: CompiledPlan) -> None:
+    study = MotionStudy(archive_of(dip), World())
+    world, plant = study.drawn(0)
+    with TrialRobot(plant) as robot:
+        robot.go2.close()
+        row = row_of(study.row(world, robot))
+    assert (row["ok"], row["fall"]) == (False, "this GO2Controller is closed")
+    assert (row["done"], row["harm"]) == (False, "fell; not done")
+    assert math.isnan(float(row["slip"]))
+
+
+@pytest.mark.parametrize(
+    ("word", "study"),
+    [
+        ("gait:trot", GaitStudy("trot", VelocityCommand(0.5))),
+        ("gait:trot@0.3,-0.1,0.2", GaitStudy("trot", VelocityCommand(0.3, -0.1, 0.2))),
+        ("push:12", PushStudy(12.0, 0.5)),
+        ("push:8@0", PushStudy(8.0, 0.0)),
+    ],
+)
+def test_words_stand_for_gaits_and_pushes(word: str, study: object) -> None:
+    assert target_of(word).function == study
+
+
+@pytest.mark.slow
+def test_a_trot_follows_its_velocity() -> None:
+    row = row_of(GaitStudy("trot", VelocityCommand(0.4, 0.1, 0.3))(4))
+    assert (row["ok"], row["fall"]) == (True, "")
+    for name in ("speed_error", "side_error", "turn_error"):
+        assert abs(float(row[name])) < SLOW_TROT, name
+
+
+@pytest.mark.slow
+def test_a_small_push_is_survived_and_a_monstrous_one_is_not() -> None:
+    """At 500 N s a robot of 15 kg flies off at 33 m/s."""
+    small, monstrous = (row_of(PushStudy(size, 0.0)(5)) for size in (4.0, 500.0))
+    assert small["ok"] is True
+    assert monstrous["ok"] is False
+    assert monstrous["fall"]
+    assert small["angle"] == monstrous["angle"]
+
+
+def test_a_row_is_replayed_to_the_last_bit_and_shown(
+    dips: SweepResult, tmp_path: Path, run: Run
+) -> None:
+    page = tmp_path / "page.html"
+    told = json.loads(run("replay", dips.path, 1, "--html", page, "--json").out)
+    assert told["differences"] == []
+    assert told["row"] == dips.rows[1]
+    text = page.read_text(encoding="utf-8")
+    header, arrays = read_data(text)
+    assert "<title>dip, seed 1" in text
+    assert len(arrays) > 3
+    assert header
+
+
+@pytest.mark.slow
+def test_a_row_that_has_become_another_one_is_told(
+    dips: SweepResult, tmp_path: Path, run: Run
+) -> None:
+    with SweepFile(dips.path) as file, SweepFile(tmp_path / "b.db", file.about) as other:
+        row: Row = {name: value for name, value in file.rows([0])[0].items() if name != "seed"}
+        other.add(0, {**row, "slip": math.nextafter(float(row["slip"]), 1.0)})
+    text = run("replay", tmp_path / "b.db", 0, code=ExitCode.FAILED).out
+    (marked,) = [line for line in text.splitlines() if "another" in line]
+    assert marked.split()[0] == "slip"
+
+
+def test_only_rows_that_are_there_and_those_of_motions_are_replayed(
+    dips: SweepResult, tmp_path: Path
+) -> None:
+    with pytest.raises(CommandError, match="no row of seed 99; it has 0 to 2"):
+        replay(dips.path, 99)
+    result = sweep(swept.trial, 1, workers=1, out=tmp_path / "rows.sqlite")
+    with pytest.raises(CommandError, match="only motions are replayed"):
+        replay(result.path, 0)

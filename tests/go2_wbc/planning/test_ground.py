@@ -189,7 +189,9 @@ def test_a_step_raises_the_swing_for_a_while_and_smooth_ground_does_not() -> Non
         learn(ground, snapshot.p_world_feet, np.ones(4, dtype=bool))
     assert apex_raise(ground, CONFIG) == 0.0
     ground.rough_way = 0.1
-    assert apex_raise(ground, CONFIG) == CONFIG.raised
+    for steep, raised in ((0.0, CONFIG.first_raised), (1.01 * STEEP, CONFIG.raised)):
+        ground.slope[:] = steep, 0.0
+        assert apex_raise(ground, CONFIG) == pytest.approx(raised)
     assert delay(ground) == 0.0
 
 

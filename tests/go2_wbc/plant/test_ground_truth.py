@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.plant.mujoco.ground_truth import GroundTruth, true_runs
+from go2_wbc.plant.mujoco.ground_truth import GroundTruth
+from go2_wbc.recording import true_runs
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand
 from tests.go2_wbc.plant.contract import same

@@ -148,6 +148,10 @@ def test_models_of_the_same_robot_have_the_same_fingerprint() -> None:
     assert len(own) == FINGERPRINT
     assert own == fingerprint(RobotModel())
     assert own == fingerprint(changed(1e-12))  # as another library's rounding does
+    model = RobotModel()
+    assert model.pin_model.armature[0] == 0.0
+    model.pin_model.armature[0] = -0.0
+    assert own == fingerprint(model)
 
 
 def test_another_mass_rotor_or_foot_is_another_robot() -> None:

@@ -53,6 +53,11 @@ def test_a_jump_takes_the_time_in_the_air_that_it_is_given() -> None:
         assert sum(flight) == pytest.approx(taken)
 
 
+def test_rearing_holds_the_front_feet_up_for_the_time_that_it_is_given() -> None:
+    up = [phase.duration for phase in phase_builders.rear(hold=0.6) if len(phase.stance) == 2]
+    assert sum(up) == pytest.approx(0.6)
+
+
 def test_a_lift_holds_the_other_feet_down() -> None:
     phases = phase_builders.lift((Leg.FL, Leg.RR))
     assert {phase.stance for phase in phases} == {ALL_FEET, frozenset({Leg.FR, Leg.RL})}

@@ -102,13 +102,14 @@ def test_what_is_too_far_off_is_refused_with_how_far(
 
 def test_what_is_no_motion_is_refused(model: RobotModel) -> None:
     good = two_feet(model)
-    flying = good.stance.copy()
-    flying[-1] = False
+    flies_off, flies_on = good.stance.copy(), good.stance.copy()
+    flies_off[0], flies_on[-1] = False, False
     for bad in (
         {"times": good.times[::-1].copy()},
         {"times": 20.0 * good.times},
         {"q": np.full_like(good.q, np.nan)},
-        {"stance": flying},
+        {"stance": flies_off},
+        {"stance": flies_on},
     ):
         with pytest.raises(TimelineError):
             replace(good, **bad)

@@ -16,7 +16,7 @@ from go2_wbc.robot.model import RobotModel
 from motions.dynamics import DynamicTrajectory, PhaseProblem, Tolerance, phase_builders, solve
 from motions.dynamics.knots import Knots, Solution, knots_of, pose_of
 from motions.dynamics.phases import Phase
-from motions.dynamics.plan_limits import PlanLimits, Weights
+from motions.dynamics.plan_audit import PlanLimits, Weights
 from motions.dynamics.solver import _misses
 from tests.motions.dynamics.conftest import PROBLEMS
 from tests.solver import needs_solver

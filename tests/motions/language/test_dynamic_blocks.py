@@ -145,3 +145,8 @@ def test_what_cannot_be_meant_is_refused_in_words(
 ) -> None:
     with pytest.raises(TimelineError, match=message):
         write()
+
+
+def test_what_follows_a_jump_counts_from_where_it_lands() -> None:
+    line = Timeline().jump(x=0.3, yaw=deg(90)).jump(x=0.2).walk(x=0.1)
+    assert line.end_pose == pytest.approx((0.3, 0.3, deg(90)), abs=1e-6)

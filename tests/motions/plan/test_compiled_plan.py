@@ -4,18 +4,21 @@ from dataclasses import fields
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
+from controller import GO2Controller
 from go2_wbc.contacts import GAITS, TIE, ContactSchedule
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.reference import LegTask, TrackedPoint
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import log_rotation
-from motions import Timeline, compile_timeline, deg, load_motion
+from go2_wbc.robot.rotations import log_rotation, rpy_from_rotation
+from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline, deg, load_motion
 from motions.plan.compiled_plan import PlanSamples
 from motions.postures import NORMAL_FORCE_MAX, sit_down
 from tests.motions.plans import curves_at, library_plan
+from tests.solver import needs_solver
 
 ROUNDING = 1e-12  # m, rad; N of 400
 STEP = 1e-5  # s; of the differences
@@ -35,6 +38,14 @@ def test_samples_are_the_references(name: str) -> None:
         difference = np.abs(one.astype(float) - other.astype(float))
         scale = 400.0 if field.name == "normal_force_max" else 1.0
         assert difference.max() <= scale * ROUNDING, field.name
+
+
+def test_a_held_foot_is_as_high_as_it_is_in_the_middle_of_its_hold() -> None:
+    plan = library_plan("high_five")
+    (held,) = plan.held_feet
+    middle = 0.5 * (held.start + held.end)
+    assert held.height == pytest.approx(plan.at(middle).p_world_feet[held.leg, 2], abs=ROUNDING)
+    assert held.height > 0.05
 
 
 @pytest.mark.parametrize("name", ["high_five", "dance", "wave", "sit_pretty", "jump_up"])
@@ -114,3 +125,47 @@ def test_contacts_at_many_times_are_those_of_each(schedule: ContactSchedule) -> 
         for name in ("stance", "elapsed", "remaining"):
             assert getattr(many, name)[row] == pytest.approx(getattr(one, name), abs=ROUNDING), name
         assert many.load_share(0.1)[row] == pytest.approx(one.load_share(0.1), abs=1e-9)
+
+
+MODEL = RobotModel()
+NEAR = 1e-3
+"""How near [m, rad] the planned state is to the curves, which are cubics through its knots; where
+accelerations jump, angles cut corners."""
+
+
+@pytest.fixture(scope="module")
+def rear() -> CompiledPlan:
+    return compile_timeline(load_motion("rear_up"), MODEL)
+
+
+def test_gains_are_there_while_two_feet_stand_and_only_then(rear: CompiledPlan) -> None:
+    for t in np.arange(0.011, rear.duration, 0.02).tolist():
+        stands = int(rear.at(t).stance.sum())
+        assert (rear.feedback_at(t) is not None) == (1 <= stands <= 2), t
+    jump = compile_timeline(load_motion("jump_up"), MODEL)
+    flies = [t for t in np.arange(0.0, jump.duration, 0.01).tolist() if not jump.at(t).stance.any()]
+    assert flies
+    assert all(jump.feedback_at(t) is None for t in flies)
+
+
+def test_the_planned_state_is_that_of_the_curves_that_are_played(rear: CompiledPlan) -> None:
+    times = np.linspace(0.0, rear.duration, 200).tolist()
+    states = [(t, found) for t in times if (found := rear.feedback_at(t)) is not None]
+    assert len(states) > 20
+    angles = list[np.ndarray]()
+    for t, state in states:
+        values = curves_at(rear, t)[0]
+        assert MODEL.center_of_mass(state.q) == pytest.approx(values[:3], abs=NEAR)
+        rpy = rpy_from_rotation(pin.Quaternion(state.q[3:7]).toRotationMatrix())
+        angles.append(np.concatenate([rpy, state.q[7:]]) - values[3:18])
+    assert np.median(np.abs(angles).max(axis=1)) < NEAR
+
+
+@needs_solver
+def test_a_robot_that_rears_for_long_stays_up_and_level() -> None:
+    """With gains for place and attitude apart it fell over, as it came down, after 0.9 s."""
+    checked = FeasibilityChecker(MODEL).evaluate(Timeline().rear(deg(-25), hold=0.9))
+    assert checked.report.ok
+    with GO2Controller() as go2:
+        assert go2.stand()
+        assert go2.play(checked), go2.last_outcome.reason

@@ -11,8 +11,8 @@ import viz
 from go2_wbc.errors import ConfigError
 from go2_wbc.legs import Leg
 from go2_wbc.recording import Recording
+from viz.render.camera import camera_path, heading_path, nearest_rows
 from viz.render.frame_renderer import FrameRenderer, ShotStyle
-from viz.render.framing import camera_path, heading_path, nearest_rows
 from viz.render.robot_meshes import PosedRobot, load_robot_visuals
 from viz.render.still import telling_times
 

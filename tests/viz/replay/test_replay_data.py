@@ -7,7 +7,7 @@ import pytest
 
 from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
-from viz.render.framing import smoothed
+from viz.render.camera import smoothed
 from viz.render.robot_meshes import PosedRobot, load_robot_visuals
 from viz.replay.page_data import replay_frames
 

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.bridges.unitree import measure_drive
 from benchmarks.study import TrialResult
-from controller.bridges.unitree.guards import GuardConfig
+from controller.bridges.unitree.low_level import GuardConfig
 from controller.bridges.unitree.plant import UnitreePlant
 from controller.sweeps.trials import Trial
 from go2_wbc.errors import CommandError, PlantTimeout

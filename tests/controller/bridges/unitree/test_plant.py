@@ -14,8 +14,7 @@ import pytest
 
 from controller import GO2Controller
 from controller.bridges.unitree import messages
-from controller.bridges.unitree.guards import GuardConfig
-from controller.bridges.unitree.low_level import low_cmd_message, low_state_message
+from controller.bridges.unitree.low_level import GuardConfig, low_cmd_message, low_state_message
 from controller.bridges.unitree.messages import decode_message, encode_message, seal
 from controller.bridges.unitree.plant import UnitreePlant
 from go2_wbc.errors import (

@@ -1,0 +1,152 @@
+"""Planes, ways, footholds and swings on terrains that are known exactly."""
+
+import math
+
+import numpy as np
+import pytest
+
+from go2_wbc.contacts import GAITS
+from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.planning.height_map import HeightMap
+from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
+from go2_wbc.planning.sight import (
+    DROP,
+    FLIGHT_SPEED,
+    RISE,
+    SPEED,
+    STOP,
+    way_ahead,
+)
+from go2_wbc.planning.sighted_steps import NEAR, OVER
+from go2_wbc.plant.terrain import DOWN, Blocks, Gap, Ramp, Slope, Stairs, Stones, Terrain
+from go2_wbc.reference import SWING
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.state import Snapshot
+from tests.engine_helpers import standing_q, state_of
+from tests.go2_wbc.planning.seen import exact_map, true_heights
+
+MODEL, CONFIG = RobotModel(), LocomotionConfig()
+FOOT = MODEL.foot_radius
+AHEAD = (1.0, 0.0, 0.9)
+
+
+@pytest.mark.parametrize(
+    ("terrain", "ends"),
+    [
+        (None, 0.0),
+        (Blocks(0.6, start=0.9), RISE),
+        (Stairs(0.30, start=0.9), RISE),
+        (Stairs(0.20, 6, 0.31, start=0.5), 0.0),
+        (Stairs(0.20, 6, 0.31, start=0.5, way=DOWN), 0.0),
+        (Stairs(0.30, 1, 0.31, start=0.7, way=DOWN), DROP),
+        (Gap(0.30, start=0.6), 0.0),
+        (Gap(0.60, start=0.6), DROP),
+        (Ramp(0.6, start=0.5), 0.0),
+        (Stones(start=0.4), 0.0),
+    ],
+    ids=str,
+)
+def test_a_way_ends_in_front_of_what_is_too_high_too_deep_or_too_wide(
+    terrain: Terrain | None, ends: float
+) -> None:
+    what, end = way_ahead(exact_map(terrain), 0.0, 0.0, AHEAD, 0.0)
+    assert what == ends
+    if ends and terrain is not None:
+        start: float = getattr(terrain, "start")  # noqa: B009  # every one of these has it
+        assert end == pytest.approx(start, abs=0.06)
+
+
+def standing(height: float = 0.3) -> Snapshot:
+    state = state_of(standing_q(height))
+    state.feet_in_contact[:] = True
+    return MODEL.snapshot(state)
+
+
+def planner(heights: HeightMap) -> LocomotionPlanner:
+    made = LocomotionPlanner(MODEL, GAITS["trot"], CONFIG, heights)
+    made.start(standing(), 0.6)
+    return made
+
+
+@pytest.mark.parametrize("angle", [-0.3, 0.0, 0.2, 0.38])
+def test_the_trunk_follows_a_slope_before_a_foot_has_met_it(angle: float) -> None:
+    """All feet still stand on a level: the map alone knows of the slope."""
+    heights = exact_map(None)
+    known = heights.name != 0.0
+    x = np.round((heights.name[known] - 0.5) / 2.0**20) * 0.025
+    heights.height[known] += math.tan(angle) * x
+    walking = planner(heights)
+    now = standing()
+    for n in range(200):
+        state = state_of(now.state.q, time=0.002 * n)
+        state.feet_in_contact[:] = True
+        walking.update(MODEL.snapshot(state), VelocityCommand())
+    slope = walking._state.ground.slope
+    np.testing.assert_allclose(
+        slope, [math.tan(angle), 0.0], atol=0.1 * abs(math.tan(angle)) + 0.01
+    )
+
+
+@pytest.mark.parametrize(
+    ("terrain", "most"),
+    [
+        (None, 0.8),
+        (Slope(0.3), 0.8),
+        (Blocks(0.10, start=0.6, count=1), SPEED),
+        (Stairs(0.16, 6, 0.31, start=0.4), FLIGHT_SPEED),
+        (Blocks(0.5, start=STOP + 0.05), 0.22),
+        (Blocks(0.5, start=STOP - 0.10), 0.0),
+    ],
+    ids=str,
+)
+def test_the_speed_is_what_the_ground_ahead_permits(terrain: Terrain | None, most: float) -> None:
+    walking, command = planner(exact_map(terrain)), VelocityCommand(0.8)
+    for n in range(1, 600):
+        state = state_of(standing_q(), time=0.002 * n)
+        walking.update(MODEL.snapshot(state), command)
+    assert walking.velocity[0] == pytest.approx(most, abs=0.06)
+    assert walking.sight.is_slowed == (most < 0.8)
+    assert bool(walking.sight.why_blocked) == (most == 0.0)
+
+
+@pytest.mark.parametrize("start", np.linspace(0.10, 0.40, 7))
+@pytest.mark.parametrize("kind", ["up", "down", "gap"])
+def test_feet_are_put_beside_edges_and_swing_over_them(start: float, kind: str) -> None:
+    terrain: Terrain = {
+        "up": Stairs(0.16, 4, 0.31, start=start + 0.05),
+        "down": Stairs(0.16, 4, 0.31, start=start + 0.25, way=DOWN),
+        "gap": Gap(0.15, start=start + 0.15),
+    }[kind]
+    heights = exact_map(terrain)
+    walking, command, landed, swung = planner(heights), VelocityCommand(0.3), 0, 0
+    walking._state.ground.p_met[:, 2] = FOOT
+    q = standing_q(0.30)
+    for n in range(1, 900):
+        v = np.zeros(18)
+        v[0], q[0] = 0.3, 0.3 * 0.002 * n - 0.3
+        reference = walking.update(MODEL.snapshot(state_of(q, v, 0.002 * n)), command)
+        for leg in range(4):
+            step = walking._state.feet[leg].step
+            if reference.legs[leg] != SWING or not step.is_sighted:
+                continue
+            p, swing = reference.p_world_feet[leg], walking._state.feet[leg].swing
+            ends = np.array([swing.start[:2], step.goal[:2]])
+            is_on_ground = swing.start[2] > true_heights(terrain, swing.start[None, :2])[0]
+            if is_on_ground and np.linalg.norm(p[:2] - ends, axis=1).min() > 0.04:
+                below = true_heights(terrain, p[None, :2])[0]
+                assert p[2] - FOOT > below + 0.5 * OVER
+                swung += 1
+            if n % 50 == 0:
+                landed += 1
+                assert distance_to_edge(terrain, step.chosen) > NEAR - 0.015
+    assert landed > 10
+    assert swung > 100
+
+
+def distance_to_edge(terrain: Terrain, place: np.ndarray) -> float:
+    """How far [m] along x the ground stays as high as it is at a place."""
+    x = np.arange(-0.08, 0.08, 0.005)
+    z = true_heights(terrain, np.column_stack([place[0] + x, np.full(len(x), place[1])]))
+    level = true_heights(terrain, place[None, :2])[0]
+    off = np.abs(x[np.abs(z - level) > 0.03])
+    return float(off.min()) if len(off) else math.inf
