@@ -72,7 +72,10 @@ class Walking(Behaviour):
         reference = self._planner.update(snapshot, command, self.pose, self.delay)
         if not self._has_told and self._planner.is_slowed:
             self._has_told = True
-            _log.warning("rough ground: %g m/s at most until it is smooth again", self._most)
+            if self._planner.is_late:
+                _log.warning("commands act %.0f ms late: it walks slower", 1000.0 * self.delay)
+            else:
+                _log.warning("rough ground: %g m/s at most until it is smooth again", self._most)
         if self._heights is not None and self._heights.is_used:
             blocked = self.blocked
             if blocked and not self._told_block:

@@ -83,6 +83,9 @@ square: what slid once shows less than there is, and goes on at once on ground t
 PROMPT, LATE, LATE_HASTE = 0.003, 0.008, 0.4
 """Lateness of the commands [s] up to which the robot speeds up by all that the ground bears, and
 from which on it does by the last share of it."""
+LATE_SPEED = 1.25
+"""Greatest speed [m/s] then: faster, feet stand for so short a time that one that lifts off, or
+comes down, by 9 ms too late or too early makes the hops between them grow until the robot falls."""
 ROUGH_HASTE = 1.0 / 3.0
 """Share of the accelerations that is left there."""
 CALMING = 0.8
@@ -209,9 +212,12 @@ def greatest_speed(g: Ground, c: RoughConfig) -> float:
 
 
 @subroutine
-def slow_down(g: Ground, c: RoughConfig, velocity: Array3) -> None:
-    """Scale what is commanded down to that."""
-    velocity *= min(greatest_speed(g, c) / max(np.hypot(velocity[0], velocity[1]), _TINY), 1.0)
+def slow_down(g: Ground, c: RoughConfig, delay: float, velocity: Array3) -> None:
+    """Scale what is commanded down to that, or to what commands permit that act so late [s]."""
+    most = greatest_speed(g, c)
+    if delay >= LATE:
+        most = min(most, LATE_SPEED)
+    velocity *= min(most / max(np.hypot(velocity[0], velocity[1]), _TINY), 1.0)
 
 
 @subroutine

@@ -25,6 +25,8 @@ from go2_wbc.planning.footholds import foothold, nominal_feet
 from go2_wbc.planning.force_mpc import apply_force_plan
 from go2_wbc.planning.gait_clock import adapt, foot_phase, restart
 from go2_wbc.planning.ground import (
+    LATE,
+    LATE_SPEED,
     LEAST_FRICTION,
     MOST_FRICTION,
     Slip,
@@ -239,7 +241,7 @@ def plan(
     s.time = time
     if m.is_used:
         look(s.sight, s.ground, m, now, s.trunk.yaw, command.velocity, dt)
-    slow_down(s.ground, c.config.rough, command.velocity)
+    slow_down(s.ground, c.config.rough, s.delay, command.velocity)
     advance_phase(now, s, c, command, dt)
     integrate(now, s, c, command, dt)
     if s.sight.sees:
@@ -344,12 +346,17 @@ class LocomotionPlanner:
 
     @property
     def is_slowed(self) -> bool:
-        """Whether rough ground keeps the robot slower than it is told."""
-        ground = self._state.ground
-        if ground.rough_way <= 0.0:
-            return False
+        """Whether rough ground or late commands keep the robot slower than it is told."""
+        ground, most = self._state.ground, LATE_SPEED if self.is_late else np.inf
+        if ground.rough_way > 0.0:
+            most = min(most, greatest_speed(ground, self._walk.config.rough))
         x, y = self._state.trunk.velocity[:2].tolist()
-        return bool(np.hypot(x, y) > greatest_speed(ground, self._walk.config.rough) - TIE)
+        return bool(np.hypot(x, y) > most - TIE)
+
+    @property
+    def is_late(self) -> bool:
+        """Whether commands act so late that the robot walks slower."""
+        return bool(self._state.delay >= LATE)
 
     @property
     def sight(self) -> Sight:

@@ -14,6 +14,7 @@ from go2_wbc.planning.ground import (
     HASTE_FRICTION,
     LATE,
     LATE_HASTE,
+    LATE_SPEED,
     LEAST_FRICTION,
     MOST_FRICTION,
     MOST_RAISE,
@@ -108,7 +109,7 @@ def test_the_robot_goes_slowly_on_rough_ground_and_for_a_way_after_it() -> None:
     def told() -> np.ndarray:
         velocity = asked.copy()
         carry_ground(ground, CONFIG, walking, half)
-        slow_down(ground, CONFIG, velocity)
+        slow_down(ground, CONFIG, 0.0, velocity)
         return velocity
 
     np.testing.assert_array_equal(told(), asked)
@@ -138,6 +139,14 @@ def test_the_robot_speeds_up_as_ground_and_motors_bear_it() -> None:
     assert haste(slope, HASTE_FRICTION, 0.0) < 1.0
     level.rough_way = 0.1
     assert haste(level, MOST_FRICTION, 0.0) == pytest.approx(ROUGH_HASTE)
+
+
+def test_where_commands_act_late_the_robot_walks_slower() -> None:
+    ground, velocity = plane(on_plane(np.zeros(2))), np.array([1.2, -1.6, 2.0])
+    slow_down(ground, CONFIG, 0.99 * LATE, velocity)
+    np.testing.assert_array_equal(velocity, [1.2, -1.6, 2.0])
+    slow_down(ground, CONFIG, LATE, velocity)
+    np.testing.assert_allclose(velocity, LATE_SPEED / 2.0 * np.array([1.2, -1.6, 2.0]))
 
 
 @pytest.mark.parametrize("friction", [0.3, 0.6])
