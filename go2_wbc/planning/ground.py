@@ -142,7 +142,8 @@ class RoughConfig:
             believed to be low, the moment of a swing takes twice the robot's weight on the feet;
             with its weight ten times that of the place the attitude got it, and the robot took off.
             Up and down those stairs came 13 of 20 without both, 17 with this, 19 with both; over
-            blocks of 14 cm 15, 20 and 19 (seeds 8800 to 8819).
+            blocks of 14 cm 15, 20 and 19 (seeds 8800 to 8819, which tuned it). On seeds 10000 on
+            it was 7 of 12 without and 9 with both, and 10 and 9 of 10.
     """
 
     speed: float = 0.5
