@@ -117,12 +117,13 @@ def test_a_command_that_comes_with_a_gait_is_followed_once_the_gait_is_there() -
         assert go2.walk("walk")
         go2.move(-0.2)
         go2.wait(1.0)
+        asked = go2.state.time
         assert go2.walk("gallop")
         go2.move(-0.8)
         assert go2.command.linear_x == -0.8
         truth.clear()
-        wait = time_between(GAITS["walk"], GAITS["gallop"])
-        go2.wait(wait)
+        is_there = asked + time_between(GAITS["walk"], GAITS["gallop"])
+        go2.wait(is_there - go2.state.time)
         slow = envelope_of(GAITS["walk"], VelocityEnvelope()).scaled(CHANGE_SHARE).backward
         speed = np.convolve(truth.recording().com_velocity[:, 0], STRIDE, "valid")
         assert speed.min() > -slow - 0.15
@@ -156,7 +157,7 @@ def test_what_a_foot_has_shown_of_ice_is_kept_for_the_next_walk(
     """What is only not known yet is not: a bound then counts on the ground."""
     model, config = RobotModel(), Config()
     snapshot = model.snapshot(MujocoPlant().read())
-    loop = SimpleNamespace(model=model)
+    loop = SimpleNamespace(model=model, heights=None)
     runner: Any = SimpleNamespace(loop=loop, engage=lambda walking: walking.start(snapshot))
     walker = Walker(runner, config)
     walker.walking = Walking(model, GAITS["trot"], config.locomotion, 0.15, has_slid)
