@@ -279,7 +279,7 @@ ESTIMATED = tuple(
     for name, item, rows, measure, prefix in (
         ("standing", "standing, 60 s", _CREEP, _stand, ""),
         ("odometry", "trot 0.5 m/s, 20 s", _DRIFT, _walk, ""),
-        ("stairs", "up 4 stairs of 8 cm, 9 s", _barred("height", 15), _ON_STAIRS, "stairs"),
+        ("stairs-height", "up 4 stairs of 8 cm, 9 s", _barred("height", 15), _ON_STAIRS, "stairs"),
         ("mixed", "20 commands, 60 s", _barred("turned", 1.5), _MIXED, "mixed"),
         ("slope", "to all sides on 15 deg, 12 s", _barred("velocity", 0.03), _ON_SLOPE, "slope"),
     )

@@ -103,7 +103,7 @@ def listed(measured: Measurements) -> str:
 
 STILL_SPEED = 0.05
 """Speed [m/s] of the base below which it counts as still."""
-CALM_SPEED = 0.015
+CALM_SPEED = 0.012
 """Speed [m/s] of the CoM below which a robot that has walked counts as at rest: it shifts its trunk
 by 0.01 (``planning.rest``), and its sensors may be off by the difference to 0.02."""
 STILL_JOINTS = 0.5

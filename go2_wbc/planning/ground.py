@@ -86,7 +86,7 @@ from which on it does by the last share of it."""
 LATE_SPEED = 1.25
 """Greatest speed [m/s] then: faster, feet stand for so short a time that one that lifts off, or
 comes down, by 9 ms too late or too early makes the hops between them grow until the robot falls."""
-ROUGH_HASTE = 1.0 / 3.0
+ROUGH_HASTE = 1.0 / 7.0
 """Share of the accelerations that is left there."""
 CALMING = 0.8
 """Share of the roughness that is left after a landing."""

@@ -63,7 +63,7 @@ def test_a_curve_over_boxes_is_walked(
 def test_the_height_is_known_after_stairs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(locomotion, "FIRST_SEED", 0)
     found = TrialResult()
-    stairs = next(study for study in locomotion.ESTIMATED if study.name == "stairs")
+    stairs = next(study for study in locomotion.ESTIMATED if study.name == "stairs-height")
     stairs.measure(Trial(2, sensors=IMU), found)
     assert found.values["height"] < HEIGHT_BAR
     assert found.values["velocity"] < VELOCITY_BAR
