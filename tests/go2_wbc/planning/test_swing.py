@@ -170,8 +170,9 @@ def test_a_foot_that_stumbles_begins_anew_where_it_is_and_leaves_the_other_swing
     a_while = STUMBLE + 8
     np.testing.assert_allclose(stumbling[a_while].p_world_feet[0, 0], start.p_world_feet[0, 0])
     assert stumbling[a_while].p_world_feet[0, 2] > start.p_world_feet[0, 2] + 0.01
-    ends = [run[-1].p_world_feet[0] for run in (calm, stumbling)]
-    np.testing.assert_allclose(*ends, atol=3e-2)  # but for the last tick, and a slower ramp
+    off = calm[-1].p_world_feet[0] - stumbling[-1].p_world_feet[0]
+    np.testing.assert_allclose(off[1:], 0.0, atol=5e-3)  # but for the last tick
+    assert 0.0 < off[0] < 0.04  # rough ground is walked by a slower ramp
 
 
 @dataclass
