@@ -49,11 +49,8 @@ class Walking(Behaviour):
         self.pose: BodyPose = LEVEL
         self.choice: GaitChoice | None = None
         self._limit, self._is_limited_until = VelocityEnvelope(), -np.inf
-        self._planner, self._most = (
-            LocomotionPlanner(model, gait, config, heights),
-            config.rough.speed,
-        )
-        self._heights = heights
+        self._planner = LocomotionPlanner(model, gait, config, heights)
+        self._most, self._heights = config.rough.speed, heights
         self._has_told, self._told_block = False, ""
 
     def start(self, snapshot: Snapshot) -> None:

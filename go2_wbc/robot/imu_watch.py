@@ -83,6 +83,7 @@ class WatchedImu(Record):
         jump, jump_time: the last of the gyro [rad/s], and for how long it is looked at [s].
         jump_seen, jump_lacks, jump_residual: sums of f . f, f . e and e . e, where feet that stand
             would seem to move apart by f, if it were an error, and do so by e [m^2/s^2].
+        any_seen, any_lacks: the first two with feet that have just landed.
         since: time since an error of the gyro was taken off [s].
         speed: of the IMU by the accelerometer, drawn to that by the feet [m/s].
         excess, most_excess: error of the accelerometer, smoothed once more, and the greatest while
@@ -107,6 +108,8 @@ class WatchedImu(Record):
     jump_seen: float
     jump_lacks: float
     jump_residual: float
+    any_seen: float
+    any_lacks: float
     since: float
     speed: Array3
     excess: Array3
@@ -140,22 +143,28 @@ def note_push(m: WatchedImu, push: V3, dt: float) -> None:
 
 
 @subroutine
-def note_turn(m: WatchedImu, between: V3, apart: V3, w: V3) -> None:
+def note_turn(m: WatchedImu, between: V3, apart: V3, w: V3, has_landed: bool) -> None:
     """Add what two feet that stand say of the gyro's error d: apart + (w - d) x between = 0.
+
+    Feet that have just landed only refute: a jump that they do not lack is none.
 
     With e = apart + w x between it is d x between = e, so that A d = b with
     A = between^2 1 - between between' and b = between x e.
     """
     moved = cross(w, between)
     e = (apart[0] + moved[0], apart[1] + moved[1], apart[2] + moved[2])
-    b = cross(between, e)
-    length = between[0] * between[0] + between[1] * between[1] + between[2] * between[2]
-    m.residual += dot(e, e)
     if m.jump_time > 0.0:
         seen = cross(triple(m.jump), between)
-        m.jump_seen += dot(seen, seen)
-        m.jump_lacks += dot(seen, e)
-        m.jump_residual += dot(e, e)
+        m.any_seen += dot(seen, seen)
+        m.any_lacks += dot(seen, e)
+        if has_landed:
+            m.jump_seen += dot(seen, seen)
+            m.jump_lacks += dot(seen, e)
+            m.jump_residual += dot(e, e)
+    if not has_landed:
+        return
+    b, length = cross(between, e), dot(between, between)
+    m.residual += dot(e, e)
     for i in range(3):
         m.turned[i] += b[i]
         m.turning[i, i] += length
@@ -228,14 +237,16 @@ def judge_jump(m: WatchedImu, change: V3, dt: float) -> None:
         is_told = m.jump_seen > SEEN and m.jump_time > JUMP_LASTS
         explains = m.jump_lacks**2 > JUMP_EXPLAINED * m.jump_seen * m.jump_residual
         share = m.jump_lacks / m.jump_seen if m.jump_seen > 0.0 else 1.0
+        any_share = m.any_lacks / m.any_seen if m.any_seen > 0.0 else 1.0
         if is_told and explains and JUMP_SHARE[0] < share < JUMP_SHARE[1]:
             m.gyro_is_off, m.refining = 1.0, REFINING
             take_off(m, triple(m.jump), m.jump_time)
-        elif share < NO_JUMP or m.jump_time > LONGEST_JUMP:
+        elif min(share, any_share) < NO_JUMP or m.jump_time > LONGEST_JUMP:
             m.jump_time = 0.0
     if m.jump_time == 0.0 and m.stood >= CALM and dot(change, change) > JUMP**2:
         put(change, m.jump)
         m.jump_time, m.jump_seen, m.jump_lacks, m.jump_residual = dt, 0.0, 0.0, 0.0
+        m.any_seen = m.any_lacks = 0.0
 
 
 @subroutine

@@ -323,8 +323,7 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
         stands = r.foot_forces[leg] > SENSED or borne[leg] - slack[leg] > LOADED
         bears = stands and borne[leg] > LOADED and is_sound(s, leg)
         s.stood[leg] = s.stood[leg] + dt if bears else 0.0
-        is_used = s.stood[leg] > LANDED and m.unborne == 0.0
-        loads[leg] = borne[leg] if is_used else 0.0
+        loads[leg] = borne[leg] if bears and m.unborne == 0.0 else 0.0
     m.is_found, m.turn[:] = 0.0, 0.0
     judge_jump(m, jump, dt)
     watch_imu(s, r, c, places, speeds, loads, up, dt)
@@ -343,17 +342,19 @@ def watch_imu(
 ) -> None:
     """Let feet that stand judge the IMU: those with a load [N]; all in the base frame."""
     m, w, v = s.imu, triple(r.gyro), (0.0, 0.0, 0.0)
+    landed = np.where(s.stood > LANDED, loads, 0.0)
     for one in range(4):
-        if loads[one] > 0.0:
+        if landed[one] > 0.0:
             arm = plus_scaled(triple(places[one]), -1.0, triple(c.p_base_imu))
             along = plus_scaled(cross(w, arm), 1.0, triple(speeds[one]))
-            v = plus_scaled(v, -loads[one] / loads.sum(), along)
-            for other in range(one):
-                if loads[other] > 0.0:
-                    between = plus_scaled(triple(places[one]), -1.0, triple(places[other]))
-                    apart = plus_scaled(triple(speeds[one]), -1.0, triple(speeds[other]))
-                    note_turn(m, between, apart, w)
-    stands = bool(np.sum(loads > 0.0) > 1)  # one foot may roll or slip
+            v = plus_scaled(v, -landed[one] / landed.sum(), along)
+        for other in range(one):
+            if loads[one] > 0.0 and loads[other] > 0.0:
+                between = plus_scaled(triple(places[one]), -1.0, triple(places[other]))
+                apart = plus_scaled(triple(speeds[one]), -1.0, triple(speeds[other]))
+                has_landed = landed[one] > 0.0 and landed[other] > 0.0
+                note_turn(m, between, apart, w, has_landed)
+    stands = bool(np.sum(landed > 0.0) > 1)  # one foot may roll or slip
     judge_gyro(m, stands, dt)
     judge_accelerometer(m, triple(r.accelerometer), w, v, up, c.gravity, stands, dt)
     s.gyro_is_off, s.accelerometer_is_off = m.gyro_is_off, m.force_is_off
