@@ -199,10 +199,10 @@ def gyro_error(m: WatchedImu) -> V3:
 
 
 @subroutine
-def judge_gyro(m: WatchedImu, stands: bool, dt: float) -> None:
+def judge_gyro(m: WatchedImu, told: float, dt: float) -> None:
     """Name it once its error has lasted, and take the error off; and once more what is left.
 
-    No time passes while there are not two feet that tell: the same pair has not told it twice.
+    ``told``: share of the time that counts: none while there are not two feet that tell.
     """
     error = gyro_error(m)
     if m.refining > 0.0:
@@ -214,7 +214,7 @@ def judge_gyro(m: WatchedImu, stands: bool, dt: float) -> None:
     most = UNEXPLAINED**2 * (m.turning[0, 0] + m.turning[1, 1] + m.turning[2, 2])
     is_off = explained > max(EXPLAINED * m.residual, m.residual - most)
     is_off = is_off and dot(error, error) > GYRO_LIMIT**2
-    m.gyro_time = m.gyro_time + (dt if stands else 0.0) if is_off else 0.0
+    m.gyro_time = m.gyro_time + told * dt if is_off else 0.0
     if m.gyro_time > GYRO_LASTS:
         m.gyro_is_off, m.refining = 1.0, REFINING
         share = 1.0 / FOUND_SHARE
