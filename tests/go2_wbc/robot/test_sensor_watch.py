@@ -301,4 +301,4 @@ def test_speeds_and_gyro_are_read_through_their_noise(noise: float) -> None:
     assert np.max(off[1:], axis=0)[0] < max(0.1, 0.15 * noise)
     assert np.sqrt(np.mean(np.square(off[50:]), axis=0))[1] < 0.5
     assert watch.faults == ()
-    assert watch.gyro_noise == pytest.approx(0.8 if noise == 1.0 else 0.0, rel=0.1)
+    assert watch.gyro_noise == pytest.approx(0.8 if noise == 1.0 else 0.0, rel=0.2)
