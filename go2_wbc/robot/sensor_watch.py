@@ -30,7 +30,7 @@ from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.records import V3, Array3, Array4, Array4x3, Array12, Record, numbers_of, packed
 from go2_wbc.robot.imu_watch import (
-    SPRUNG,
+    STRUCK,
     THROWN,
     WatchedImu,
     judge_accelerometer,
@@ -336,7 +336,7 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
         bears = stands and borne[leg] > LOADED and is_sound(s, leg)
         s.stood[leg] = s.stood[leg] + dt if bears else 0.0
         if max(borne[leg], r.foot_forces[leg]) > c.weight:
-            m.sprung = SPRUNG
+            m.struck = STRUCK
         loads[leg] = borne[leg] if bears and m.unborne == 0.0 else 0.0
     m.is_found, m.turn[:] = 0.0, 0.0
     if noise_of_gyro(s.speed_noise) == 0.0:
