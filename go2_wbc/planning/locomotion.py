@@ -26,7 +26,6 @@ from go2_wbc.planning.force_mpc import apply_force_plan
 from go2_wbc.planning.gait_clock import adapt, foot_phase, restart
 from go2_wbc.planning.ground import (
     LATE,
-    LATE_SPEED,
     LEAST_FRICTION,
     MOST_FRICTION,
     Slip,
@@ -37,6 +36,7 @@ from go2_wbc.planning.ground import (
     ground_below,
     haste,
     is_rough,
+    late_share,
     learn_ground,
     level_friction,
     note_stumble,
@@ -176,7 +176,7 @@ def note_liftoffs(
             foot.is_awaited = False
         foot.was_stance = stance[leg]
     height, a, b = s.ground.height, s.ground.slope[0], s.ground.slope[1]
-    learn_ground(s.ground, now, c.foot_radius, met)
+    learn_ground(s.ground, now, c.foot_radius, met, s.delay)
     if s.sight.sees:
         s.ground.height, s.ground.slope[0], s.ground.slope[1] = height, a, b
         return
@@ -351,10 +351,10 @@ class LocomotionPlanner:
     @property
     def is_slowed(self) -> bool:
         """Whether rough ground or late commands keep the robot slower than it is told."""
-        ground, most = self._state.ground, LATE_SPEED if self.is_late else np.inf
-        if ground.rough_way > 0.0:
-            most = min(most, greatest_speed(ground, self._walk.config.rough))
         x, y = self._state.trunk.velocity[:2].tolist()
+        if self.is_late and late_share(x, y) > 1.0 - TIE:
+            return True
+        most = greatest_speed(self._state.ground, self._walk.config.rough)
         return bool(np.hypot(x, y) > most - TIE)
 
     @property
