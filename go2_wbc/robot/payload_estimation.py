@@ -29,6 +29,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from go2_wbc.algebra.linear import cross, plus, plus_scaled, put, solve_linear, triple
+from go2_wbc.arguments import typed
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.records import V3, Array3, Array6, Array12, Array18, Record, packed
 from go2_wbc.robot.model import RobotModel
@@ -43,6 +44,7 @@ NOTHING = 0.02
 """Mass [kg] at which a belief that fades has ended."""
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE, release=SHARE, middle=FINITE)
 class PayloadConfig:

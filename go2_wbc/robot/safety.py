@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from go2_wbc.arguments import typed
 from go2_wbc.compilation import Foreign, kernel
 from go2_wbc.records import Array4, Array12, Array18, Array19, ArrayNx3
 from go2_wbc.robot.profile import RobotProfile, find_profile
@@ -61,6 +62,7 @@ def heights(now: Snapshot, underside: ArrayNx3) -> tuple[float, float]:
     return height - lowest, height + clearance - lowest + now.foot_radius
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE)
 class SafetyConfig:

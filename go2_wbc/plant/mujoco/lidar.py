@@ -19,6 +19,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant.base import Scan
 from go2_wbc.plant.mujoco.model import add_floor, add_terrain
@@ -33,6 +34,7 @@ ROUNDING = 1e-9
 GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE, noise=NOT_NEGATIVE, latency=NOT_NEGATIVE)
 class LidarConfig:
