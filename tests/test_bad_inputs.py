@@ -167,7 +167,7 @@ def _taken(call: Any, only: str = "") -> Iterator[type]:  # noqa: ANN401
     """Our classes that its parameters take; those of an abstract one are all of its kind."""
     if only and not isinstance(call, property):
         return
-    hints = _hints(call.fget if isinstance(call, property) else call)
+    hints = _hints(call.fget or print if isinstance(call, property) else call)
     kinds = [kind for name, kind in hints.items() if (name == "return") == bool(only)]
     for kind in kinds:
         kinds += typing.get_args(kind)

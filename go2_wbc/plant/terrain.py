@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.arguments import typed
+from go2_wbc.brief import brief
 from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Rule, ranged
 
@@ -435,6 +436,8 @@ class Course(Terrain):
     """
 
     parts: tuple[Terrain, ...]
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a part without an end, or for none."""

@@ -12,7 +12,6 @@ import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
 import mujoco
@@ -120,7 +119,7 @@ class Lidar:
     def save(self) -> Mapping[str, Any]:
         """All that the next scans depend on, besides the robot."""
         state = self._rng.bit_generator.state
-        return MappingProxyType({"noise": state, "told": tuple(self._told), "next": self._next})
+        return {"noise": state, "told": tuple(self._told), "next": self._next}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go back to what ``save`` returned."""

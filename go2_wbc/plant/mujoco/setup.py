@@ -104,6 +104,10 @@ class SavedPhysics(NamedTuple):
     faults: Mapping[str, Any]
     lidar: Mapping[str, Any] | None = None
 
+    def __repr__(self) -> str:
+        """After how many ticks, and what waits."""
+        return f"SavedPhysics(ticks={self.ticks}, pushes={len(self.pushes)})"
+
 
 def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout, MotorModel, RobotDescription]:
     """The compiled model, its index tables, its motors, and what it was taken for.
