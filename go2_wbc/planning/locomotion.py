@@ -297,6 +297,10 @@ class LocomotionPlanner:
         self._state, self._command = Planner(), Command()
         self.change_gait(gait)
 
+    def __repr__(self) -> str:
+        """With which gait."""
+        return f"<LocomotionPlanner: {self._gait!r}>"
+
     @typed()
     def start(
         self, snapshot: Snapshot, friction: float | None = None, has_slid: bool = True
@@ -340,7 +344,7 @@ class LocomotionPlanner:
 
         The command, and the velocity that is left of one before, must be within its envelope.
         """
-        self._walk = packed(Walk.of(self._model, gait, self._config))
+        self._gait, self._walk = gait, packed(Walk.of(self._model, gait, self._config))
         self._state.planned.next = -np.inf
 
     @property
