@@ -136,7 +136,7 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
     """Ramp velocity and pose, integrate to the place, apply the leash, correct the height."""
     trunk, config = s.trunk, c.config
     advance_pose(trunk.pose, trunk.pose_rate, config.pose, command.pose, dt)
-    linear = haste(s.ground, s.slip.friction, s.delay) * config.linear_acceleration
+    linear = haste(s.ground, s.slip.friction, s.delay, trunk.velocity) * config.linear_acceleration
     accelerate(trunk, command, linear, config.angular_acceleration, dt)
     follow_heading(trunk, now, config.yaw_leash, dt)
     if s.is_stepping:

@@ -9,6 +9,8 @@ import pytest
 
 from go2_wbc.planning.ground import (
     DELAY,
+    FAST,
+    FAST_HASTE,
     FRICTION_RISE,
     GROUND_SHARE,
     HALF_SPEED,
@@ -25,6 +27,7 @@ from go2_wbc.planning.ground import (
     MOST_RAISE,
     MOST_SLOPE,
     PROMPT,
+    QUICK,
     ROUGH,
     ROUGH_HASTE,
     SLIP_SPEED,
@@ -59,6 +62,7 @@ CONFIG = RoughConfig()
 SLOPE = np.array([0.2, -0.1])
 EXACT = 1e-12
 TICK = 0.002
+SLOW = np.array([0.0, QUICK, 6.0])  # as fast as it may be without being fast
 STANCE = np.ones(4, dtype=bool)
 PRESSURE = 40.0  # N on each foot
 ROUNDING = 1e-9
@@ -139,12 +143,13 @@ def test_the_robot_goes_slowly_on_rough_ground_and_for_a_way_after_it() -> None:
 
 def test_the_robot_speeds_up_as_ground_and_motors_bear_it() -> None:
     level, slope = plane(on_plane(np.zeros(2))), plane(on_plane(SLOPE))
-    assert haste(level, MOST_FRICTION, PROMPT) == 1.0
-    assert haste(level, MOST_FRICTION, 2.0 * LATE) == pytest.approx(LATE_HASTE)
-    assert haste(level, 0.5 * HASTE_FRICTION, LATE) == pytest.approx(0.25)
-    assert haste(slope, HASTE_FRICTION, 0.0) < 1.0
+    assert haste(level, MOST_FRICTION, PROMPT, SLOW) == 1.0
+    assert haste(level, MOST_FRICTION, 2.0 * LATE, SLOW) == pytest.approx(LATE_HASTE)
+    assert haste(level, 0.5 * HASTE_FRICTION, LATE, SLOW) == pytest.approx(0.25)
+    assert haste(slope, HASTE_FRICTION, 0.0, SLOW) < 1.0
+    assert haste(level, MOST_FRICTION, 0.0, FAST / QUICK * SLOW) == pytest.approx(FAST_HASTE)
     level.rough_way = 0.1
-    assert haste(level, MOST_FRICTION, 0.0) == pytest.approx(ROUGH_HASTE)
+    assert haste(level, MOST_FRICTION, 0.0, SLOW) == pytest.approx(ROUGH_HASTE)
 
 
 def test_where_commands_act_late_the_robot_walks_slower() -> None:
