@@ -133,6 +133,7 @@ class EstimatorState(Record):
     Attributes:
         filter: the estimate, and how sure it is.
         gyro: the last reading [rad/s].
+        gyro_noise: its noise, if that is more than usual [rad/s].
         rest: whether the robot rests, lies or has tumbled.
         level: the ground.
         feet: what the legs measure.
@@ -140,6 +141,7 @@ class EstimatorState(Record):
 
     filter: Filter
     gyro: Array3
+    gyro_noise: float
     rest: Rest
     level: Level
     feet: tuple[Foot, Foot, Foot, Foot]
@@ -223,6 +225,8 @@ def estimate(
         mean[k] = 0.5 * (reading.gyro[k] + s.gyro[k]) - x.gyro_bias[k]
         s.gyro[k] = reading.gyro[k]
     process_noise(told, dt, noise)
+    if s.gyro_noise > told.gyro:
+        noise[THETA : THETA + 3] = (s.gyro_noise * dt) ** 2
     rests = is_at_rest(x, s.rest, reading, dt, gravity, told)
     predict(f, dt, mean, reading.accelerometer, gravity, R, noise)
     rotation_of_estimate(x, R)
@@ -278,6 +282,7 @@ class StateEstimator:
         """Take in a reading that is newer than the last one; returns the state at its time."""
         if self.watch is not None:
             reading = self.watch.checked(reading, self._x.quaternion)
+            self._state.gyro_noise = self.watch.gyro_noise
             if (turn := self.watch.misturned) is not None:
                 self._turn_back(turn)
         step = reading.time - self._time

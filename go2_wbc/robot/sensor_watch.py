@@ -7,6 +7,7 @@ named, and put right where they tell what it should have been. The residuals:
     encoder stuck    q and v stay while the leg's others do not   nothing replaces it
     foot's force     against f = -J^-T (tau - M dv/dt)            replaced by f
     IMU              against feet that stand: ``imu_watch``       the error is taken off
+    noise            of speeds and gyro: ``speed_noise``          what angles and time say
 
 with J and M of a leg alone, in the base frame. Forces are judged while the legs carry the robot. A
 reading that is not a number is taken for the one before. A healthy robot's readings leave as they
@@ -29,6 +30,7 @@ from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.records import V3, Array3, Array4, Array4x3, Array12, Record, numbers_of, packed
 from go2_wbc.robot.imu_watch import (
+    STRUCK,
     THROWN,
     WatchedImu,
     judge_accelerometer,
@@ -40,6 +42,7 @@ from go2_wbc.robot.imu_watch import (
 )
 from go2_wbc.robot.leg_kinematics import LegGeometry, Legs, leg_table
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.speed_noise import SpeedNoise, calm_gyro, calm_joints, noise_of_gyro
 from go2_wbc.robot.state import PartFault, SensorReading
 
 JUMP = 0.05
@@ -98,6 +101,7 @@ class WatchedSensors(Record):
         stood: for how long a foot has borne its leg's load [s].
         against: for how long a foot's force has contradicted the leg's torques [s].
         gyro, accelerometer: the last, as they were read.
+        speed_noise: of the joints' speeds and the gyro.
         imu: the IMU against feet that stand.
         stuck, force_is_wrong, gyro_is_off, accelerometer_is_off: 1 for what is broken.
         jumped: 1 for an encoder whose shift is not 0.
@@ -120,6 +124,7 @@ class WatchedSensors(Record):
     against: Array4
     gyro: Array3
     accelerometer: Array3
+    speed_noise: SpeedNoise
     imu: WatchedImu
     stuck: Array12
     jumped: Array12
@@ -197,14 +202,19 @@ def watch_encoders(s: WatchedSensors, r: SensorReading, dt: float) -> None:
             others = max(others, s.same[k]) if k != j else others
         if s.same[j] > STUCK_TIME and others < DOUBT:
             s.stuck[j] = 1.0
+    mean = 0.5 * (r.v_joints + s.v)
+    off = r.q_joints - s.q - mean * dt
     for j in range(12):
-        jump = r.q_joints[j] - s.q[j] - 0.5 * (r.v_joints[j] + s.v[j]) * dt
-        if abs(jump) > JUMP and s.whole > 1.0:
-            s.shift[j] += jump
-            s.jumped[j] = 1.0 if abs(s.shift[j]) > 0.5 * JUMP else 0.0
-        s.dv[j] += gain * ((r.v_joints[j] - s.v[j]) / dt - s.dv[j])
+        if abs(off[j]) > JUMP:
+            if s.whole > 1.0:
+                s.shift[j] += off[j]
+                s.jumped[j] = 1.0 if abs(s.shift[j]) > 0.5 * JUMP else 0.0
+            off[j] = 0.0
         s.q[j], s.v[j] = r.q_joints[j], r.v_joints[j]
         r.q_joints[j] -= s.shift[j]
+    calm_joints(s.speed_noise, r, off, mean, dt)
+    s.dv[:] += gain * ((r.v_joints - s.speed_noise.v) / dt - s.dv)
+    s.speed_noise.v[:] = r.v_joints
 
 
 @subroutine
@@ -325,9 +335,12 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
         stands = r.foot_forces[leg] > SENSED or borne[leg] - slack[leg] > LOADED
         bears = stands and borne[leg] > LOADED and is_sound(s, leg)
         s.stood[leg] = s.stood[leg] + dt if bears else 0.0
+        if max(borne[leg], r.foot_forces[leg]) > c.weight:
+            m.struck = STRUCK
         loads[leg] = borne[leg] if bears and m.unborne == 0.0 else 0.0
     m.is_found, m.turn[:] = 0.0, 0.0
-    judge_jump(m, jump, dt)
+    if noise_of_gyro(s.speed_noise) == 0.0:
+        judge_jump(m, jump, dt)
     watch_imu(s, r, c, places, speeds, loads, up, dt)
 
 
@@ -400,15 +413,12 @@ def watch_sensors(
         watch_encoders(s, r, dt)
     else:
         s.has_begun, s.step, s.whole = 1.0, dt, 2.0
-        for j in range(12):
-            s.q[j], s.v[j] = r.q_joints[j], r.v_joints[j]
-            r.q_joints[j] -= s.shift[j]
+        s.q[:], s.v[:], s.speed_noise.v[:] = r.q_joints, r.v_joints, r.v_joints
+        r.q_joints[:] -= s.shift
+    calm_gyro(s.speed_noise, r, dt)
     watch_legs(s, r, c, up, dt)
     broken = s.gyro_is_off + s.accelerometer_is_off
-    for j in range(12):
-        broken += s.stuck[j] + s.jumped[j]
-    for leg in range(4):
-        broken += s.force_is_wrong[leg]
+    broken += s.stuck.sum() + s.jumped.sum() + s.force_is_wrong.sum()
     return int(broken)
 
 
@@ -432,6 +442,11 @@ class SensorWatch:
         """How far [rad] an error of the IMU, just found, has turned whoever believed it."""
         m = self._state.imu
         return m.turn.copy() if m.is_found else None
+
+    @property
+    def gyro_noise(self) -> float:
+        """Root mean square [rad/s] of the noise of a gyro that is noisy, else 0."""
+        return float(noise_of_gyro(self._state.speed_noise))
 
     def restart(self) -> None:
         """Forget everything: all parts are taken for sound."""

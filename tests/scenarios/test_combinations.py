@@ -2,6 +2,7 @@
 
 import pytest
 
+from benchmarks.rough import LATEST, UnreliablePlant
 from controller.sweeps.trials import TrialRobot
 from go2_wbc.plant import MujocoPlant
 
@@ -24,6 +25,21 @@ def test_a_robot_whose_commands_are_late_walks_on_slippery_ground_with_a_load(
         robot.go2.stop()
         robot.require(robot.go2.last_outcome.ok)
         robot.require(robot.go2.stand())
+
+
+def test_a_robot_whose_commands_come_late_by_turns_is_sound_and_walks_on_level_ground() -> None:
+    """Its legs struck each other, it took the floor for stairs and sound parts for broken ones."""
+    settings = {"sensors": "imu", "seed": 9402, "friction": 0.7}
+    with TrialRobot(UnreliablePlant(settings, latest=LATEST)) as robot:
+        robot.require(robot.go2.stand())
+        robot.require(robot.go2.walk())
+        robot.truth.clear()
+        for ahead, left in ((2.0, 0.0), (0.0, 1.0), (0.0, -1.0), (0.0, 1.0)):
+            robot.go2.move(ahead, linear_y=left)
+            robot.wait(3.0)
+            assert not robot.go2._pilot._walker.walking._planner._state.ground.rough_way
+        assert not robot.truth.recording().touches_itself.any()
+        assert robot.go2.health.is_sound
 
 
 def test_what_a_walk_has_shown_of_the_ground_is_known_to_the_next() -> None:

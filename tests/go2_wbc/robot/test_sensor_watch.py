@@ -280,3 +280,25 @@ def test_a_robot_that_turns_has_a_sound_gyro() -> None:
         turning.append(reading(k, gyro=w, v_joints=v))
     _, faults = watched(*turning)
     assert faults == ()
+
+
+@pytest.mark.parametrize("noise", [1.0, 0.01])
+def test_speeds_and_gyro_are_read_through_their_noise(noise: float) -> None:
+    """Of 3 and 0.8 rad/s a motor was called dead, and no robot stood up; of little all is kept."""
+    rng, swing = np.random.default_rng(5), 2.0 * np.pi * 1.5
+    watch, w, off = SensorWatch(MODEL), np.array([0.0, 0.0, 0.3]), []
+    for k in range(400):
+        q = STANDING + 0.2 * np.sin(swing * DT * k)
+        v = np.full(12, 0.2 * swing * np.cos(swing * DT * k))
+        v_read, w_read = v + 3.0 * noise * rng.normal(size=12), w + 0.8 * noise * rng.normal(size=3)
+        free = {"tau": np.zeros(12), "foot_forces": np.zeros(4)}
+        one = reading(k, q_joints=q, v_joints=v_read, gyro=w_read, **free)
+        passed = watch.checked(one, LEVEL)
+        off.append([np.abs(passed.v_joints - v).max(), np.abs(passed.gyro - w).max()])
+        if noise < 0.1:
+            np.testing.assert_array_equal(passed.v_joints, one.v_joints)
+            np.testing.assert_array_equal(passed.gyro, one.gyro)
+    assert np.max(off[1:], axis=0)[0] < max(0.1, 0.15 * noise)
+    assert np.sqrt(np.mean(np.square(off[50:]), axis=0))[1] < 0.5
+    assert watch.faults == ()
+    assert watch.gyro_noise == pytest.approx(0.8 if noise == 1.0 else 0.0, rel=0.2)
