@@ -1,13 +1,25 @@
 """What the MPC looks at: where the feet will be of a robot that a push has thrown."""
 
 import numpy as np
+import pinocchio as pin
+import pytest
 
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
-from go2_wbc.planning.force_mpc import excess_velocity, look_ahead
+from go2_wbc.planning.force_mpc import (
+    excess_velocity,
+    fill_contacts,
+    inertia_about_com,
+    look_ahead,
+    turn_from,
+)
+from go2_wbc.planning.gait_clock import Clock
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
+from go2_wbc.planning.mpc import NODES, STEP, Horizon
 from go2_wbc.planning.trunk import Trunk
 from go2_wbc.planning.walk import Planner, Walk
+from go2_wbc.robot.rotations import yaw_rotation
+from tests.engine_helpers import standing_q, state_of
 from tests.go2_wbc.planning.squared import MODEL, at, moving, resting
 
 CONFIG = LocomotionConfig()
@@ -27,6 +39,42 @@ def test_feet_of_a_thrown_robot_come_down_below_it() -> None:
     presses = seen.share >= CONFIG.mpc.least_share
     assert presses.any(axis=0).all()
     assert np.linalg.norm(seen.arms[presses][:, :2], axis=1).max() <= FARTHEST
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_inertia_and_the_turn_are_those_of_rigid_body_dynamics(seed: int) -> None:
+    """Centroidal inertia: Pinocchio's Ig, of the composite body; the turn: log(R R_ref')."""
+    rng, q = np.random.default_rng(seed), standing_q()
+    q[3:7] = pin.Quaternion(pin.exp3(rng.uniform(-0.8, 0.8, 3))).coeffs()
+    q[7:] += rng.uniform(-0.3, 0.3, 12)
+    now, inertia, turn = MODEL.snapshot(state_of(q)), np.empty((3, 3)), np.empty(3)
+    data = MODEL.pin_model.createData()
+    pin.ccrba(MODEL.pin_model, data, q, np.zeros(18))
+    inertia_about_com(now, inertia)
+    np.testing.assert_allclose(inertia, data.Ig.inertia, atol=1e-9)
+    turn_from(now, 0.7, turn)
+    np.testing.assert_allclose(turn, pin.log3(now.R_world_base @ yaw_rotation(0.7).T), atol=1e-9)
+
+
+@pytest.mark.parametrize("duty", [0.4, 0.5, 0.8, 1.0])
+@pytest.mark.parametrize("time", [0.0, 0.07, 0.13, 0.29])
+def test_the_contacts_ahead_are_those_of_the_clock_looked_at_finely(
+    duty: float, time: float
+) -> None:
+    """Share: integral over the node; landings: strides until it stands for the node's beginning."""
+    period, offsets, fine = 0.36, np.array([0.0, 0.5, 0.25, 0.75]), 2000
+    horizon = Horizon()
+    fill_contacts(Clock(time=time, period=period, duty=duty, offsets=offsets), horizon)
+    for leg, k in np.ndindex(4, NODES):
+        instants = time + STEP * (k + (np.arange(fine) + 0.5) / fine)
+        stands = (instants / period - offsets[leg]) % 1.0 < duty
+        assert horizon.share[k, leg] == pytest.approx(stands.mean(), abs=2.0 / fine)
+        now, then = ((t / period - offsets[leg]) for t in (time, time + k * STEP))
+        if duty >= 1.0 or (then % 1.0 < duty and np.floor(then) == np.floor(now)):
+            assert horizon.landings[k, leg] <= 0.0
+        else:  # the stride's beginning, counted from now
+            begin = np.floor(then) + (0.0 if then % 1.0 < duty else 1.0)
+            assert horizon.landings[k, leg] == pytest.approx(begin - now)
 
 
 def test_within_the_margin_the_wanted_way_counts() -> None:
