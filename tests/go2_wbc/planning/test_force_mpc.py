@@ -19,11 +19,13 @@ from go2_wbc.planning.mpc import NODES, STEP, Horizon
 from go2_wbc.planning.trunk import Trunk
 from go2_wbc.planning.walk import Planner, Walk
 from go2_wbc.robot.rotations import yaw_rotation
+from go2_wbc.robot.state import Snapshot
 from tests.engine_helpers import standing_q, state_of
 from tests.go2_wbc.planning.squared import MODEL, at, moving, resting
 
 CONFIG = LocomotionConfig()
 COMMAND = VelocityCommand(0.5)
+ARC = VelocityCommand(0.5, -0.1, 0.4)
 FARTHEST = 0.65  # m, a foot from the CoM at 3.7 m/s: 0.60
 
 
@@ -75,6 +77,69 @@ def test_the_contacts_ahead_are_those_of_the_clock_looked_at_finely(
         else:  # the stride's beginning, counted from now
             begin = np.floor(then) + (0.0 if then % 1.0 < duty else 1.0)
             assert horizon.landings[k, leg] == pytest.approx(begin - now)
+
+
+def steady(yaw: float, command: VelocityCommand = ARC) -> tuple[Snapshot, LocomotionPlanner]:
+    """A robot that trots with ``command``, and has for long, in the heading ``yaw``."""
+    way = yaw_rotation(yaw) @ [command.linear_x, command.linear_y, 0.0]
+    planner, now = LocomotionPlanner(MODEL, GAITS["trot"], CONFIG), moving(resting(0.0, yaw), way)
+    planner.start(now)
+    planner._state.trunk.velocity[:] = command.linear_x, command.linear_y, command.angular_z
+    planner.update(now, command)
+    look_ahead(now, planner._state, planner._walk, planner._command)
+    return now, planner
+
+
+def test_a_steady_command_is_integrated_along_its_arc() -> None:
+    _, planner = steady(0.6)
+    trunk, goals = planner._state.trunk, planner._state.horizon.goals
+    yaw = trunk.yaw + ARC.angular_z * STEP * np.arange(1, NODES + 1)
+    c, s, (x, y) = np.cos(yaw), np.sin(yaw), (ARC.linear_x, ARC.linear_y)
+    way = np.column_stack([c * x - s * y, s * x + c * y])
+    np.testing.assert_allclose(goals[:, 9:11], way, atol=1e-12)
+    np.testing.assert_allclose(goals[:, 3:5], trunk.position[:2] + STEP * way.cumsum(0), atol=1e-12)
+    np.testing.assert_allclose(goals[:, 2], yaw - trunk.yaw, atol=1e-12)
+    np.testing.assert_allclose(goals[:, 8], ARC.angular_z, atol=1e-12)
+    assert np.ptp(goals[:, 5]) == pytest.approx(0.0, abs=1e-12)
+    assert np.abs(goals[:, [0, 1, 11]]).max() == pytest.approx(0.0, abs=1e-12)
+
+
+def test_on_a_straight_way_arms_reach_to_feet_that_stay_and_to_those_below_the_hips() -> None:
+    """A foot that lands once more is below its hip in the middle of its stance."""
+    now, planner = steady(0.4, VelocityCommand(0.5, -0.1))
+    h, clock, v = planner._state.horizon, planner._state.clock, now.v_world_com[:2]
+    hips = (planner._walk.p_base_feet_nominal * [1.0, clock.width, 1.0]) @ yaw_rotation(0.4).T
+    base = now.q[:2] + now.com_shift[:2]
+    kinds = np.zeros(3, dtype=int)
+    for k, leg in np.ndindex(NODES, 4):
+        found = now.p_world_com[:2] + v * STEP * (k + 0.5) + h.arms[k, leg, :2]
+        landing = h.landings[k, leg]
+        if landing == 0.0:
+            kind, wanted = 0, now.p_world_feet[leg, :2]
+        elif landing < 1.0 - clock.duty:
+            kind, wanted = 1, now.p_world_com[:2] + v * STEP * 0.5 + h.arms[0, leg, :2]
+        else:
+            middle = (landing + clock.duty / 2) * clock.period
+            kind, wanted = 2, base + hips[leg, :2] + v * middle
+        np.testing.assert_allclose(found, wanted, atol=1e-9)
+        kinds[kind] += 1
+    assert kinds.min() >= 4, "of each kind"
+    np.testing.assert_allclose(now.p_world_com[2] + h.arms[..., 2], 0.0, atol=2e-3)
+
+
+def test_the_accelerations_are_those_that_the_planned_forces_make() -> None:
+    """Newton and Euler, about the CoM, of the forces of the feet that stand."""
+    now, planner = steady(0.3)
+    plan, h = planner.update(at(now, 0.002), ARC), planner._state.horizon
+    stood = np.maximum(h.share[0], CONFIG.mpc.least_share)[:, None]
+    forces = np.where(plan.stance[:, None], h.forces[0] / stood, 0.0)
+    np.testing.assert_allclose(plan.f_world_feet, forces, atol=1e-12)
+    contacts = now.p_world_feet - [0.0, 0.0, MODEL.foot_radius]
+    inertia, moment = np.empty((3, 3)), np.cross(contacts - now.p_world_com, forces).sum(axis=0)
+    inertia_about_com(now, inertia)
+    weight = [0.0, 0.0, -MODEL.gravity]
+    np.testing.assert_allclose(plan.body.a_world, forces.sum(0) / MODEL.mass + weight, atol=1e-9)
+    np.testing.assert_allclose(inertia @ plan.body.dw_world, moment, atol=1e-9)
 
 
 def test_within_the_margin_the_wanted_way_counts() -> None:
