@@ -83,6 +83,7 @@ def steady(yaw: float, command: VelocityCommand = ARC) -> tuple[Snapshot, Locomo
     """A robot that trots with ``command``, and has for long, in the heading ``yaw``."""
     way = yaw_rotation(yaw) @ [command.linear_x, command.linear_y, 0.0]
     planner, now = LocomotionPlanner(MODEL, GAITS["trot"], CONFIG), moving(resting(0.0, yaw), way)
+    now = now.replaced(p_world_com=now.p_world_com + [0.03, -0.02, 0.0])
     planner.start(now)
     planner._state.trunk.velocity[:] = command.linear_x, command.linear_y, command.angular_z
     planner.update(now, command)
