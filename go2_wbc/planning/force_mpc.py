@@ -78,8 +78,9 @@ def fill_goals(s: Planner, c: Walk, command: Command) -> None:
     yaw, x, y = s.trunk.yaw, s.trunk.position[0], s.trunk.position[1]
     a, b = tilt(s.ground)
     steep = np.hypot(a, b)
-    share = np.arctan(steep) / steep if steep > 0.0 else 1.0
-    linear = haste(s.ground, s.slip.friction, s.delay) * config.linear_acceleration
+    as_angle = np.arctan(steep) / steep if steep > 0.0 else 1.0
+    share = haste(s.ground, s.slip.friction, s.delay, s.trunk.velocity)
+    linear = share * config.linear_acceleration
     goals[:] = 0.0
     for k in range(NODES):
         ramp(velocity, command, linear, config.angular_acceleration, STEP)
@@ -91,8 +92,8 @@ def fill_goals(s: Planner, c: Walk, command: Command) -> None:
         y += goals[k, 10] * STEP
         goals[k, 2], goals[k, 8] = yaw - s.trunk.yaw, velocity[2]
         goals[k, 3], goals[k, 4] = x, y
-        goals[k, 0], goals[k, 1] = share * b, -share * a
-        goals[k, 5] = ground_at(s.ground, x, y) + c.height + s.sight.lift
+        goals[k, 0], goals[k, 1] = as_angle * b, -as_angle * a
+        goals[k, 5] = ground_at(s.ground, x, y) + c.height + s.ground.lift
         goals[k, 5] += s.trunk.height_offset
         goals[k, 11] = s.ground.slope[0] * goals[k, 9] + s.ground.slope[1] * goals[k, 10]
 

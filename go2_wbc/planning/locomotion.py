@@ -30,6 +30,7 @@ from go2_wbc.planning.ground import (
     MOST_FRICTION,
     Slip,
     carry_ground,
+    carry_higher,
     greatest_speed,
     ground_at,
     ground_below,
@@ -78,6 +79,7 @@ from go2_wbc.planning.trunk import (
     is_settled,
     is_zero,
     level,
+    world_velocity,
 )
 from go2_wbc.planning.walk import (
     GREATEST_HEIGHT,
@@ -134,7 +136,7 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
     """Ramp velocity and pose, integrate to the place, apply the leash, correct the height."""
     trunk, config = s.trunk, c.config
     advance_pose(trunk.pose, trunk.pose_rate, config.pose, command.pose, dt)
-    linear = haste(s.ground, s.slip.friction, s.delay) * config.linear_acceleration
+    linear = haste(s.ground, s.slip.friction, s.delay, trunk.velocity) * config.linear_acceleration
     accelerate(trunk, command, linear, config.angular_acceleration, dt)
     follow_heading(trunk, now, config.yaw_leash, dt)
     if s.is_stepping:
@@ -142,7 +144,9 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
     else:
         rest_in_place(now, s, config.position_leash, dt)
     carry_ground(s.ground, config.rough, now, dt)
-    correct_height(trunk, now, s.ground.height + (c.height + s.sight.lift), dt)
+    is_uneven = s.sight.uneven_way > 0.0 if s.sight.sees else is_rough(s.ground)
+    carry_higher(s.ground, world_velocity(trunk), is_uneven, dt)
+    correct_height(trunk, now, s.ground.height + (c.height + s.ground.lift), dt)
 
 
 @subroutine
@@ -264,7 +268,7 @@ def plan(
     observe_slip(s.slip, now, contact, tau, stands, steps, beside, dt)
     note_liftoffs(now, s, c, contact, stance, progress)
     target.friction = level_friction(s.ground, s.slip.friction, LEAST_FRICTION)
-    fill_body(s.trunk, s.ground, c.height + s.sight.lift, target)
+    fill_body(s.trunk, s.ground, c.height + s.ground.lift, target)
     target.p_world[2] = on_leash(s.ground, c.config.rough, target.p_world[2], now)
     level(s.trunk, now, contact, s.is_stepping, dt, target)
     fill_feet(now, s, c, stance, stands, elapsed, remaining, target, m, dt)
@@ -292,6 +296,10 @@ class LocomotionPlanner:
         self._heights = HeightMap() if heights is None else heights
         self._state, self._command = Planner(), Command()
         self.change_gait(gait)
+
+    def __repr__(self) -> str:
+        """With which gait."""
+        return f"<LocomotionPlanner: {self._gait!r}>"
 
     @typed()
     def start(
@@ -336,7 +344,7 @@ class LocomotionPlanner:
 
         The command, and the velocity that is left of one before, must be within its envelope.
         """
-        self._walk = packed(Walk.of(self._model, gait, self._config))
+        self._gait, self._walk = gait, packed(Walk.of(self._model, gait, self._config))
         self._state.planned.next = -np.inf
 
     @property

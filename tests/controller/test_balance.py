@@ -56,13 +56,17 @@ def test_a_push_that_feet_in_place_cannot_hold_starts_steps(impulse: float, angl
     # It fell.
     with pushed(impulse, angle) as go2:
         assert go2.mode is Mode.MOVING
+        loop = go2._runner.loop
+        assert not loop.behaviour.is_finished(loop.snapshot), "though the posture's time is over"
         for _ in range(round(LIMIT / 0.1)):
             go2.wait(0.1)
             if go2.mode is Mode.STANDING:
                 break
         go2.wait(1.0)  # it still moves over its feet, at up to 0.05 m/s
         assert go2.mode is Mode.STANDING
-        assert is_standing(go2._runner.loop.snapshot)
+        assert is_standing(loop.snapshot)
+        go2.wait(loop.behaviour.duration)
+        assert loop.behaviour.is_finished(loop.snapshot)
         assert np.linalg.norm(go2.state.q[:2]) > 0.1, "it was pushed away and stands there"
 
 

@@ -9,6 +9,8 @@ import pytest
 
 from go2_wbc.planning.ground import (
     DELAY,
+    FAST,
+    FAST_HASTE,
     FRICTION_RISE,
     GROUND_SHARE,
     HALF_SPEED,
@@ -18,10 +20,14 @@ from go2_wbc.planning.ground import (
     LATE_HASTE,
     LATE_SPEED,
     LEAST_FRICTION,
+    LIFT,
+    LIFT_RATE,
+    LOWERED,
     MOST_FRICTION,
     MOST_RAISE,
     MOST_SLOPE,
     PROMPT,
+    QUICK,
     ROUGH,
     ROUGH_HASTE,
     SLIP_SPEED,
@@ -35,6 +41,7 @@ from go2_wbc.planning.ground import (
     Slip,
     apex_raise,
     carry_ground,
+    carry_higher,
     delay,
     exerted_ratio,
     ground_at,
@@ -55,6 +62,7 @@ CONFIG = RoughConfig()
 SLOPE = np.array([0.2, -0.1])
 EXACT = 1e-12
 TICK = 0.002
+SLOW = np.array([0.0, QUICK, 6.0])  # as fast as it may be without being fast
 STANCE = np.ones(4, dtype=bool)
 PRESSURE = 40.0  # N on each foot
 ROUNDING = 1e-9
@@ -135,12 +143,13 @@ def test_the_robot_goes_slowly_on_rough_ground_and_for_a_way_after_it() -> None:
 
 def test_the_robot_speeds_up_as_ground_and_motors_bear_it() -> None:
     level, slope = plane(on_plane(np.zeros(2))), plane(on_plane(SLOPE))
-    assert haste(level, MOST_FRICTION, PROMPT) == 1.0
-    assert haste(level, MOST_FRICTION, 2.0 * LATE) == pytest.approx(LATE_HASTE)
-    assert haste(level, 0.5 * HASTE_FRICTION, LATE) == pytest.approx(0.25)
-    assert haste(slope, HASTE_FRICTION, 0.0) < 1.0
+    assert haste(level, MOST_FRICTION, PROMPT, SLOW) == 1.0
+    assert haste(level, MOST_FRICTION, 2.0 * LATE, SLOW) == pytest.approx(LATE_HASTE)
+    assert haste(level, 0.5 * HASTE_FRICTION, LATE, SLOW) == pytest.approx(0.25)
+    assert haste(slope, HASTE_FRICTION, 0.0, SLOW) < 1.0
+    assert haste(level, MOST_FRICTION, 0.0, FAST / QUICK * SLOW) == pytest.approx(FAST_HASTE)
     level.rough_way = 0.1
-    assert haste(level, MOST_FRICTION, 0.0) == pytest.approx(ROUGH_HASTE)
+    assert haste(level, MOST_FRICTION, 0.0, SLOW) == pytest.approx(ROUGH_HASTE)
 
 
 def test_where_commands_act_late_the_robot_walks_slower() -> None:
@@ -179,6 +188,25 @@ def test_an_upright_cone_lies_within_that_about_the_normal_of_a_slope(friction: 
     learn(ground, on_plane(SLOPE, 0.5).p_world_feet, np.ones(4, dtype=bool))
     assert level_friction(ground, friction, 0.01) == pytest.approx(friction)  # as on stairs
     assert level_friction(plane(on_plane(np.zeros(2))), friction, 0.01) == friction
+
+
+@pytest.mark.parametrize(
+    ("slope", "is_uneven", "lift"),
+    [(1.1, True, LIFT), (0.9, True, 0.0), (-1.1, True, 0.0), (1.1, False, 0.0)],
+)
+def test_down_uneven_ground_it_goes_with_a_higher_trunk(
+    slope: float, is_uneven: bool, lift: float
+) -> None:
+    """And back where it no longer leads down; it gets there no faster than told."""
+    ground = Ground(slope=[0.0, slope * LOWERED])
+    carry_higher(ground, (0.0, -0.5), is_uneven, TICK)
+    assert ground.lift == pytest.approx(min(lift, LIFT_RATE * TICK))
+    for _ in range(500):
+        carry_higher(ground, (0.0, -0.5), is_uneven, TICK)
+    assert ground.lift == lift
+    for _ in range(500):
+        carry_higher(ground, (0.0, 0.0), is_uneven, TICK)
+    assert ground.lift == 0.0
 
 
 def test_feet_that_land_on_another_plane_turn_it_there() -> None:

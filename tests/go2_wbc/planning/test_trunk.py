@@ -16,7 +16,11 @@ from go2_wbc.planning.ground import FOLLOW, Ground
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.planning.mpc import NODES
 from go2_wbc.planning.trunk import (
+    ANGLE_WINDOW,
     LEVEL,
+    RATE,
+    STRIDE_RATE,
+    STRIDE_WINDOW,
     BodyPose,
     Command,
     PoseConfig,
@@ -24,6 +28,7 @@ from go2_wbc.planning.trunk import (
     Trunk,
     advance_pose,
     fill_body,
+    level,
     pose_turn,
 )
 from go2_wbc.planning.walk import Planner, Walk
@@ -64,6 +69,27 @@ def test_the_turn_that_is_planned_for_is_that_of_the_slope(slope: tuple[float, f
     turn = log_rotation(attitude(0.0, np.array(slope)))
     np.testing.assert_allclose(planner.horizon.goals[:, :3], np.tile(turn, (NODES, 1)), atol=EXACT)
     assert np.linalg.norm(turn) == pytest.approx(np.arctan(0.3))
+
+
+@pytest.mark.parametrize("missing", [None, 0, 1, 2, 3])
+@pytest.mark.parametrize("is_stepping", [False, True])
+def test_the_lean_is_integrated_from_the_error_of_the_vertical_while_it_is_known(
+    missing: int | None, is_stepping: bool
+) -> None:
+    """In the world, of roll and pitch alone: d offset / dt = rate (z x z_wanted)."""
+    wanted, measured = rotation_from_rpy(0.02, -0.03, 0.4), rotation_from_rpy(-0.01, 0.015, -0.5)
+    q = standing_q()
+    q[3:7] = pin.Quaternion(measured).coeffs()
+    contact, offset = np.arange(4) != missing, np.array([0.003, -0.002])
+    trunk, target = Trunk(lean_offset=offset.copy()), Target(R_world_base=wanted.copy())
+    level(trunk, MODEL.snapshot(state_of(q)), contact, is_stepping, TICK, target)
+    if is_stepping or missing is None:
+        rate = STRIDE_RATE if is_stepping else RATE
+        window = STRIDE_WINDOW if is_stepping else ANGLE_WINDOW
+        error = np.cross(measured[:, 2], wanted[:, 2])[:2]
+        offset += rate * TICK * np.clip(error, -window, window)
+    np.testing.assert_allclose(trunk.lean_offset, offset, atol=EXACT)
+    np.testing.assert_allclose(target.R_world_base, pin.exp3(np.array([*offset, 0.0])) @ wanted)
 
 
 @pytest.mark.parametrize("name", ["height", "roll", "pitch", "yaw"])

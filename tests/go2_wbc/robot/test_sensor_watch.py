@@ -12,7 +12,21 @@ from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.robot.imu_watch import WatchedImu, judge_jump
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.sensor_watch import SensorWatch, leg_motion, less_rolling
+from go2_wbc.robot.sensor_watch import (
+    CHANGED,
+    FREE,
+    LOADED,
+    NOISY,
+    RUBBING,
+    SAME_TIME,
+    SENSED,
+    UNFELT,
+    SensorWatch,
+    WatchedSensors,
+    leg_motion,
+    less_rolling,
+    watch_force,
+)
 from go2_wbc.robot.state import PartFault, SensorReading
 
 MODEL = RobotModel()
@@ -71,10 +85,11 @@ def test_a_legs_motion_and_force_are_pinocchios(leg: int) -> None:
         pin.updateFramePlacements(model, data)
         J = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[:3, 6:][:, joints]
         given = (triple(q[7:][joints]), triple(v[6:][joints]), triple(tau[joints]))
-        place, u, force, _ = plain(leg_motion)(leg_table(MODEL).geometry[leg], *given)
+        place, u, force, slack = plain(leg_motion)(leg_table(MODEL).geometry[leg], *given)
         assert place == pytest.approx(data.oMf[frame].translation, abs=1e-6)
         assert u == pytest.approx(J @ v[6:][joints], abs=1e-5)
         assert J.T @ np.array(force) == pytest.approx(-tau[joints], abs=1e-3)
+        assert slack == pytest.approx(RUBBING * abs(np.linalg.inv(J.T)[2]) @ abs(v[6:][joints]))
 
 
 def test_a_foot_that_rolls_has_the_velocity_of_the_point_that_touches() -> None:
@@ -94,6 +109,13 @@ def test_a_sound_robots_readings_leave_as_they_came() -> None:
     assert faults == ()
     for field in fields(SensorReading):
         assert np.array_equal(getattr(last, field.name), getattr(readings[-1], field.name))
+
+
+def test_legs_that_carry_a_robot_push_it_against_gravity() -> None:
+    watch = SensorWatch(MODEL)
+    for step in range(600):
+        watch.checked(reading(step), LEVEL)
+    assert watch._state.imu.push == pytest.approx([0.0, 0.0, MODEL.gravity], abs=0.05)
 
 
 @pytest.mark.parametrize("name", ["gyro", "q_joints", "v_joints", "foot_forces", "accelerometer"])
@@ -165,6 +187,56 @@ def test_a_sensor_that_changes_lives_whatever_its_leg_bears() -> None:
 
     _, faults = watched(*(reading(k, foot_forces=forces(k)) for k in range(1000)))
     assert faults == ()
+
+
+NOISE = {"noisy": 1.1 * NOISY, "still": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("noise", "last", "force", "borne", "is_against"),
+    [
+        ("noisy", 0.0, 0.0, FREE + 1.0, True),
+        ("still", 0.0, 0.0, FREE + 1.0, False),
+        ("still", 0.0, 0.0, LOADED + 1.0, True),
+        ("still", 0.0, 1.0, LOADED + 1.0, True),
+        ("noisy", 0.0, 1.0, LOADED + 1.0, False),  # one that changes lives
+        ("still", 0.0, UNFELT + 1.0, LOADED + 1.0, False),
+        ("still", 30.0, SENSED + 1.0, FREE - 1.0, True),
+        ("still", 30.0, SENSED - 1.0, FREE - 1.0, False),
+        ("still", 30.0, SENSED + 1.0, FREE + 1.0, False),
+    ],
+)
+def test_a_foots_sensor_is_against_its_leg(
+    noise: str, last: float, force: float, borne: float, is_against: bool
+) -> None:
+    for leg in range(4):
+        s, r = WatchedSensors(), reading(1, foot_forces=np.full(4, force))
+        s.noise[:, leg], s.force[leg] = NOISE[noise], last
+        watch_force(s, r, leg, borne, 0.0, True, DT)
+        assert s.against[leg] == (DT if is_against else 0.0)
+
+
+@pytest.mark.parametrize(
+    ("noise", "force", "borne", "is_wrong"),
+    [
+        ("still", 44.0, 44.0 + 1.1 * CHANGED, True),
+        ("still", 44.0, 44.0 - 0.9 * CHANGED, False),
+        ("noisy", 44.0, 44.0, True),
+        ("still", 0.0, FREE - 1.0, False),
+        ("noisy", 0.0, FREE - 1.0, True),
+    ],
+)
+def test_a_sensor_that_says_the_same_is_wrong_once_it_should_not(
+    noise: str, force: float, borne: float, is_wrong: bool
+) -> None:
+    for leg in range(4):
+        s, r = WatchedSensors(), reading(1, foot_forces=np.full(4, force))
+        s.noise[int(force > UNFELT), leg] = NOISE[noise]
+        s.force[leg], s.load[leg], s.force_same[leg] = force, 44.0 * (force > 0.0), SAME_TIME
+        watch_force(s, r, leg, borne, 0.0, True, DT)
+        assert s.force_is_wrong[leg] == is_wrong
+        kept = borne if borne > LOADED else 0.0
+        assert r.foot_forces[leg] == (kept if is_wrong else force)
 
 
 def test_joints_that_rub_are_not_taken_for_loads() -> None:

@@ -274,6 +274,19 @@ def test_a_restored_plant_goes_on_as_it_did_even_in_the_middle_of_a_push(sensors
     assert all(map(same, first, history(plant)))
 
 
+@pytest.mark.parametrize("saves", [{}, {"sensors": "imu", "lidar": True}])
+@pytest.mark.parametrize("restores", [{}, {"sensors": "imu", "lidar": True}])
+def test_a_plant_goes_back_to_what_one_with_other_sensors_has_saved(
+    saves: dict[str, Any], restores: dict[str, Any]
+) -> None:
+    saving, restoring = MujocoPlant(**saves), MujocoPlant(**restores)
+    history(saving, 20)
+    restoring.restore(saving.save())
+    assert same(restoring.truth(), saving.truth())
+    restoring.write(DAMPED)
+    assert restoring.read().time == pytest.approx(saving.time + restoring.control_period)
+
+
 def test_the_truth_is_that_of_this_moment_after_all_that_changes_it() -> None:
     plant = MujocoPlant(sensors="noisy")
     saved, lying = plant.save(), plant.truth()
