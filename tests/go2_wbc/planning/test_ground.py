@@ -20,9 +20,6 @@ from go2_wbc.planning.ground import (
     LATE_HASTE,
     LATE_SPEED,
     LEAST_FRICTION,
-    LIFT,
-    LIFT_RATE,
-    LOWERED,
     MOST_FRICTION,
     MOST_RAISE,
     MOST_SLOPE,
@@ -41,7 +38,6 @@ from go2_wbc.planning.ground import (
     Slip,
     apex_raise,
     carry_ground,
-    carry_higher,
     delay,
     exerted_ratio,
     ground_at,
@@ -188,25 +184,6 @@ def test_an_upright_cone_lies_within_that_about_the_normal_of_a_slope(friction: 
     learn(ground, on_plane(SLOPE, 0.5).p_world_feet, np.ones(4, dtype=bool))
     assert level_friction(ground, friction, 0.01) == pytest.approx(friction)  # as on stairs
     assert level_friction(plane(on_plane(np.zeros(2))), friction, 0.01) == friction
-
-
-@pytest.mark.parametrize(
-    ("slope", "is_uneven", "lift"),
-    [(1.1, True, LIFT), (0.9, True, 0.0), (-1.1, True, 0.0), (1.1, False, 0.0)],
-)
-def test_down_uneven_ground_it_goes_with_a_higher_trunk(
-    slope: float, is_uneven: bool, lift: float
-) -> None:
-    """And back where it no longer leads down; it gets there no faster than told."""
-    ground = Ground(slope=[0.0, slope * LOWERED])
-    carry_higher(ground, (0.0, -0.5), is_uneven, TICK)
-    assert ground.lift == pytest.approx(min(lift, LIFT_RATE * TICK))
-    for _ in range(500):
-        carry_higher(ground, (0.0, -0.5), is_uneven, TICK)
-    assert ground.lift == lift
-    for _ in range(500):
-        carry_higher(ground, (0.0, 0.0), is_uneven, TICK)
-    assert ground.lift == 0.0
 
 
 def test_feet_that_land_on_another_plane_turn_it_there() -> None:
