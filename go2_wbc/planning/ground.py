@@ -97,10 +97,6 @@ CALMING = 0.8
 """Share of the roughness that is left after a landing."""
 STUMBLE = 0.06
 """Roughness [m] that a foot tells which is stopped in the middle of its swing."""
-LOWERED, LIFT, LIFT_RATE = 0.15, 0.045, 0.1
-"""Fall of the way, per metre, from which on it leads down; by how much [m] the trunk is carried
-higher on it if it is uneven, so that its calves pass the edges, and how fast [m/s] it comes there:
-down 6 stairs of 14 cm at 0.8 m/s, blind, came 28 of 30 with it and 16 of 20 without."""
 DELAY = 0.4
 """Share of a swing, on the roughest ground, in which the foot only rises. At a step of 10 cm, feet
 that stood close to it rubbed along its face and stood on its edge: 4 of 40 runs fell, none with
@@ -179,7 +175,6 @@ class Ground(Record):
         rough_way: for how far [m] it is taken for rough yet.
         high_way: for how far [m] steps are taken for high yet.
         steeper: share of the slope by which the trunk follows it more.
-        lift: height [m] by which the trunk is carried higher.
     """
 
     height: float
@@ -190,7 +185,6 @@ class Ground(Record):
     rough_way: float
     high_way: float
     steeper: float
-    lift: float
 
 
 def ground_below(now: Snapshot, foot_radius: float) -> Ground:
@@ -320,15 +314,6 @@ def carry_ground(g: Ground, c: RoughConfig, now: Snapshot, dt: float) -> None:
     x, y = now.p_world_com[0], now.p_world_com[1]
     g.height = ground_at(g, x, y)
     g.p_seen[0], g.p_seen[1] = x, y
-
-
-@subroutine
-def carry_higher(g: Ground, velocity: tuple[float, float], is_uneven: bool, dt: float) -> None:
-    """Bring the trunk higher, or back, after ``dt`` seconds of a wanted ``velocity`` [m/s]."""
-    x, y = velocity
-    leads_down = g.slope[0] * x + g.slope[1] * y < -LOWERED * np.hypot(x, y)
-    lift = LIFT if is_uneven and leads_down else 0.0
-    g.lift += min(max(lift - g.lift, -LIFT_RATE * dt), LIFT_RATE * dt)
 
 
 @subroutine

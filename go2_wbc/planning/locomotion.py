@@ -30,7 +30,6 @@ from go2_wbc.planning.ground import (
     MOST_FRICTION,
     Slip,
     carry_ground,
-    carry_higher,
     greatest_speed,
     ground_at,
     ground_below,
@@ -79,7 +78,6 @@ from go2_wbc.planning.trunk import (
     is_settled,
     is_zero,
     level,
-    world_velocity,
 )
 from go2_wbc.planning.walk import (
     GREATEST_HEIGHT,
@@ -144,9 +142,7 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
     else:
         rest_in_place(now, s, config.position_leash, dt)
     carry_ground(s.ground, config.rough, now, dt)
-    is_uneven = s.sight.uneven_way > 0.0 if s.sight.sees else is_rough(s.ground)
-    carry_higher(s.ground, world_velocity(trunk), is_uneven, dt)
-    correct_height(trunk, now, s.ground.height + (c.height + s.ground.lift), dt)
+    correct_height(trunk, now, s.ground.height + (c.height + s.sight.lift), dt)
 
 
 @subroutine
@@ -268,7 +264,7 @@ def plan(
     observe_slip(s.slip, now, contact, tau, stands, steps, beside, dt)
     note_liftoffs(now, s, c, contact, stance, progress)
     target.friction = level_friction(s.ground, s.slip.friction, LEAST_FRICTION)
-    fill_body(s.trunk, s.ground, c.height + s.ground.lift, target)
+    fill_body(s.trunk, s.ground, c.height + s.sight.lift, target)
     target.p_world[2] = on_leash(s.ground, c.config.rough, target.p_world[2], now)
     level(s.trunk, now, contact, s.is_stepping, dt, target)
     fill_feet(now, s, c, stance, stands, elapsed, remaining, target, m, dt)

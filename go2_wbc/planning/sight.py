@@ -47,6 +47,9 @@ SPEED, FLIGHT_SPEED = 0.43, 0.32
 """Greatest speed [m/s] on it, and on a flight of stairs: of"""
 FLIGHT, FLIGHT_STEP = 3, 0.13
 """so many steps in sight, and higher than that [m]."""
+LOWERED, LIFT, LIFT_RATE = 0.15, 0.045, 0.1
+"""Fall of the way, per metre, from which on it leads down; by how much [m] the trunk is higher on
+it, and how fast [m/s] it comes there."""
 GREATEST_STEP, GREATEST_GAP = 0.24, 0.38
 """Height [m] of a step and length [m] of a hole that the robot does not try."""
 EVEN, FOOT_CELLS = 0.04, 3
@@ -71,6 +74,7 @@ class Sight(Record):
     Attributes:
         sees: whether the ground below the trunk is known.
         uneven_way: for how far [m] the ground is taken for uneven yet.
+        lift: height [m] by which the trunk is carried higher.
         blocked: what ends the way ahead, 0 for nothing.
         end: how far ahead [m] of the CoM that is.
         stopped: for how long [s] it has been so near that the robot has stopped.
@@ -79,6 +83,7 @@ class Sight(Record):
 
     sees: bool
     uneven_way: float
+    lift: float
     blocked: float
     end: float
     stopped: float
@@ -252,6 +257,8 @@ def look(
     g.roughness, g.rough_way, g.high_way = mean, 0.0, 0.0
     climb = g.slope[0] * way[0] + g.slope[1] * way[1]
     g.steeper = 1.0 - FOLLOW if climb > 0.0 else 0.0
+    lift = LIFT if climb < -LOWERED and sight.uneven_way > 0.0 else 0.0
+    sight.lift += min(max(lift - sight.lift, -LIFT_RATE * dt), LIFT_RATE * dt)
     sight.blocked, sight.end = way_ahead(m, x, y, way, plane[0])
     is_near = sight.blocked != 0.0 and sight.end < STOP + NEAR_STOP
     sight.stopped = sight.stopped + dt if is_near else 0.0
