@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ConfigError
 from go2_wbc.planning import ground, swing
@@ -231,3 +232,9 @@ class Planner(Record):
     planned: PlannedForces
     horizon: Horizon
     sight: Sight
+
+
+@subroutine
+def carried_height(s: Planner, c: Walk) -> float:
+    """Height [m] of the CoM above the ground at which it is carried."""
+    return c.height + s.sight.lift + s.ground.lift
