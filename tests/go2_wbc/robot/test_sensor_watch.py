@@ -9,6 +9,7 @@ import pytest
 from go2_wbc.algebra.linear import triple
 from go2_wbc.compilation import plain
 from go2_wbc.legs import FOOT_NAMES
+from go2_wbc.robot.imu_watch import CALM, SHAKEN, WatchedImu, judge_jump
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.sensor_watch import SensorWatch, leg_motion, less_rolling
@@ -268,3 +269,19 @@ def test_a_robot_that_turns_has_a_sound_gyro() -> None:
         turning.append(reading(k, gyro=w, v_joints=v))
     _, faults = watched(*turning)
     assert faults == ()
+
+
+def test_a_jerk_as_a_foot_lands_is_no_jump_of_the_gyro() -> None:
+    # On stairs of 13 cm 2 of 20 sound gyros were named, and the robots stopped.
+    imu, jerk = WatchedImu(stood=CALM), (0.5, 0.0, 0.0)
+    judge_jump(imu, jerk, True, DT)
+    assert imu.jump_time == 0.0
+    judge_jump(imu, jerk, False, DT)
+    assert imu.jump_time > 0.0
+    judge_jump(imu, ZERO, True, DT)  # a foot whose load is measured a little later
+    assert imu.jump_time == 0.0
+    judge_jump(imu, jerk, False, DT)
+    for _ in range(round(SHAKEN / DT)):
+        judge_jump(imu, ZERO, False, DT)
+    judge_jump(imu, ZERO, True, DT)
+    assert imu.jump_time > SHAKEN
