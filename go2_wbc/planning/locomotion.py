@@ -30,6 +30,7 @@ from go2_wbc.planning.ground import (
     MOST_FRICTION,
     Slip,
     carry_ground,
+    expect_steps,
     greatest_speed,
     ground_at,
     ground_below,
@@ -78,6 +79,7 @@ from go2_wbc.planning.trunk import (
     is_settled,
     is_zero,
     level,
+    world_velocity,
 )
 from go2_wbc.planning.walk import (
     GREATEST_HEIGHT,
@@ -88,6 +90,7 @@ from go2_wbc.planning.walk import (
     Planner,
     Rest,
     Walk,
+    carried_height,
 )
 from go2_wbc.records import packed
 from go2_wbc.reference import STANCE, SWING, Reference, Target
@@ -142,7 +145,8 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
     else:
         rest_in_place(now, s, config.position_leash, dt)
     carry_ground(s.ground, config.rough, now, dt)
-    correct_height(trunk, now, s.ground.height + (c.height + s.sight.lift), dt)
+    expect_steps(s.ground, config.rough, now, world_velocity(trunk), dt)
+    correct_height(trunk, now, s.ground.height + carried_height(s, c), dt)
 
 
 @subroutine
@@ -264,7 +268,7 @@ def plan(
     observe_slip(s.slip, now, contact, tau, stands, steps, beside, dt)
     note_liftoffs(now, s, c, contact, stance, progress)
     target.friction = level_friction(s.ground, s.slip.friction, LEAST_FRICTION)
-    fill_body(s.trunk, s.ground, c.height + s.sight.lift, target)
+    fill_body(s.trunk, s.ground, carried_height(s, c), target)
     target.p_world[2] = on_leash(s.ground, c.config.rough, target.p_world[2], now)
     level(s.trunk, now, contact, s.is_stepping, dt, target)
     fill_feet(now, s, c, stance, stands, elapsed, remaining, target, m, dt)

@@ -30,6 +30,7 @@ from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.records import V3, Array3, Array4, Array4x3, Array12, Record, numbers_of, packed
 from go2_wbc.robot.imu_watch import (
+    SHAKEN,
     STRUCK,
     THROWN,
     WatchedImu,
@@ -339,8 +340,9 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
             m.struck = STRUCK
         loads[leg] = borne[leg] if bears and m.unborne == 0.0 else 0.0
     m.is_found, m.turn[:] = 0.0, 0.0
+    is_shaken = bool(np.any((s.stood > 0.0) & (s.stood <= SHAKEN)))
     if noise_of_gyro(s.speed_noise) == 0.0:
-        judge_jump(m, jump, dt)
+        judge_jump(m, jump, is_shaken, dt)
     watch_imu(s, r, c, places, speeds, loads, up, dt)
 
 
