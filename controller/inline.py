@@ -8,9 +8,6 @@ from __future__ import annotations
 
 import base64
 import html
-import io
-
-from matplotlib.figure import Figure
 
 from controller.report_view import planned, verdict_of
 from controller.seen_terrain import SeenTerrain
@@ -23,11 +20,10 @@ from viz.content import ReplayContent
 from viz.render.ground import ground_figure
 from viz.render.margin_plot import margin_figure
 from viz.replay.html_page import replay_html
+from viz.style import png_of
 
 HEIGHT = 620
 """Of a page [px]."""
-SHARPNESS = 120
-"""Of a plot [dots per inch]."""
 LONGEST = 60.0
 """Motions and recordings that last longer [s] are not drawn unasked: the page would be large."""
 
@@ -42,7 +38,7 @@ def html_of(value: object) -> str | None:
         if isinstance(value, Recording):
             return _page(ReplayContent(value), "recording", value.duration)
         if isinstance(value, SeenTerrain):
-            return _picture(ground_figure(value.points(), repr(value)))
+            return _picture(png_of(ground_figure(value.points(), repr(value))))
         if isinstance(value, Timeline | CompiledPlan):
             value = FeasibilityChecker().evaluate(value)
         if isinstance(value, CheckedMotion):
@@ -65,13 +61,12 @@ def _report(report: FeasibilityReport) -> str:
     table, verdict = html.escape(report.table()), verdict_of(report)
     if not verdict.curves:
         return f"<pre>{table}</pre>"
-    return f"<pre>{table}</pre>{_picture(margin_figure(verdict, title=report.motion))}"
+    figure = margin_figure(verdict, title=report.motion)
+    return f"<pre>{table}</pre>{_picture(png_of(figure))}"
 
 
-def _picture(figure: Figure) -> str:
-    drawing = io.BytesIO()
-    figure.savefig(drawing, format="png", dpi=SHARPNESS)
-    picture = base64.b64encode(drawing.getvalue()).decode()
+def _picture(png: bytes) -> str:
+    picture = base64.b64encode(png).decode()
     return f'<img style="max-width:100%" src="data:image/png;base64,{picture}">'
 
 
