@@ -54,7 +54,7 @@ GREATEST_STEP, GREATEST_GAP = 0.24, 0.38
 """Height [m] of a step and length [m] of a hole that the robot does not try."""
 EVEN, FOOT_CELLS = 0.04, 3
 """Cells in a row that a foot needs, and the height [m] by which two of them may differ."""
-FAR, LINE, MOVED_ASIDE = 1.15, 0.15, 0.075
+FAR, LINE, MOVED_ASIDE = 1.15, 0.15, 0.1
 """How far ahead [m] its way is looked along, how far aside [m] the feet go, and how far from there
 they can be put."""
 STOP, BRAKING = 0.60, 0.5
