@@ -109,4 +109,4 @@ def test_a_depth_camera_sees_the_ground_ahead_with_a_noise_that_grows_with_the_s
         here = (far > low) & (far < high)
         assert here.sum() > 100
         assert np.std(off[here] / far[here] ** 2) == pytest.approx(noisy.noise, rel=0.15)
-    assert other.deviation == pytest.approx(np.sqrt(np.mean(off**2)), rel=0.1)
+    assert other.deviation == pytest.approx(np.sqrt(np.mean(off**2)), rel=0.2)
