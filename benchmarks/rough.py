@@ -152,7 +152,8 @@ class Way:
 def measure_way(trial: Trial, found: TrialResult, way: Way, first_seed: int = FIRST_SEED) -> None:
     """Walk the way; see the module's docstring for what is measured."""
     seed = first_seed + trial.seed
-    length = way.terrain(seed).end + BEYOND if way.length is None else way.length
+    behind = (way.terrain(seed).end + BEYOND) / abs(math.cos(way.heading))
+    length = way.length or behind
     with TrialRobot(way.plant(seed, trial.sensors)) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())

@@ -47,7 +47,7 @@ SPEED, FLIGHT_SPEED = 0.43, 0.32
 """Greatest speed [m/s] on it, and on a flight of stairs: of"""
 FLIGHT, FLIGHT_STEP = 3, 0.13
 """so many steps in sight, and higher than that [m]."""
-LOWERED, LIFT, LIFT_RATE = 0.15, 0.045, 0.1
+LOWERED, LIFT, LIFT_RATE = 0.15, 0.08, 0.1
 """Fall of the way, per metre, from which on it leads down; by how much [m] the trunk is higher on
 it, and how fast [m/s] it comes there."""
 GREATEST_STEP, GREATEST_GAP = 0.24, 0.38

@@ -8,15 +8,18 @@ distance d, that costs least:
         comes below CLEARANCE over the ground, and the hip out of reach
 
 ``way`` is that from where the foot is led at present: what the trunk's velocity does within a
-stride must not send it to and fro. ``edge`` falls, as a square, from 1 at ``NEAR`` to 0 at
+stride must not send it to and fro. ``edge`` falls, as a square, through 1 at ``NEAR`` to 0 at
 ``NEAR_ENOUGH`` from the next cell that is lower by more than ``STEP``, or unknown, or a little
 nearer if it is higher; ``range`` is that of the heights of the cells around it. It is chosen anew
-until ``LATEST`` of the swing, and gone over to at ``SLEW``; later only its height follows.
+until ``LATEST`` of the swing, and gone over to at ``SLEW``; later only its height follows. The
+place that was chosen last may always be kept: the blind one swings aside with the trunk by 8 cm,
+and would drag it over an edge.
 
 The swing goes up to a top over both of its ends and all that is between, and down; each part's time
 is by its height. It goes ahead between two moments, which are the nearest to the swing's begin and
-end between which it keeps ``OVER`` from what it passes. So the foot rises in front of a step, and
-goes ahead over the edge behind it before it comes down; on the level it goes ahead all the time.
+to ``LANDED``, from which on the foot may touch, between which it keeps ``OVER`` from what it
+passes. So the foot rises in front of a step, and goes ahead over the edge behind it before it comes
+down; on the level it goes ahead all the time.
 """
 
 from __future__ import annotations
@@ -53,8 +56,8 @@ LEAST_TOP, OVER_WAY, OVER = 0.06, 0.05, 0.02
 """Height [m] of a swing's top over its ends, over the ground between them, and of every other point
 over what it passes."""
 SHAPED, WAITS, WAIT, LANDED = 0.1, 6, 0.06, 0.9
-"""Share of the swing until which its shape is sought, and the moments tried: how many, and how far
-apart."""
+"""Share of the swing until which its shape is sought, the moments tried, how many and how far
+apart, and the last of them."""
 LANDS = 0.03
 """Distance [m] from the map within which a contact late in the swing may be a landing."""
 
