@@ -233,7 +233,7 @@ class ControlLoop:
     @property
     def _acted(self) -> JointCommand:
         """The command that has acted until now."""
-        return self._commands[max(-1 - self.latency.ticks, -len(self._commands))]
+        return self._commands[max(-1 - self.latency.acted, -len(self._commands))]
 
     def _watch_feet(self, target: Reference | JointReference) -> None:
         if not (isinstance(target, Reference) and self.plant.motors_obey):

@@ -48,6 +48,9 @@ STEPS_LIMIT = 4.0
 """Time [s] in which steps for balance must come to rest."""
 CALM_TIME = 0.1
 """Time [s] for which a posture must hold without a break."""
+REST_TIME = 0.3
+"""The same [s] of rest after a walk: for half of that a trunk that the last step has left 15 mm off
+its height is slow while it turns round, and then moves on at 0.02 to 0.03 m/s."""
 ROUNDING = 1e-9
 """Time [s] by which a sum of control periods may miss its end."""
 SINK_TIME = 1.0
@@ -256,14 +259,16 @@ class Runner:
         self.engage(behaviour)
         self.until(lambda: behaviour.is_finished(self.loop.snapshot), limit, behaviour.label)
 
-    def settle(self, what: str, asked: Callable[[Snapshot], Limited]) -> None:
-        """Let time pass until what is ``asked`` has been within its limits for a while."""
-        if not self.settles(lambda now: are_within(asked(now))):
-            why = told(asked(self.loop.snapshot)) or f"not for {CALM_TIME:g} s without a break"
+    def settle(
+        self, what: str, asked: Callable[[Snapshot], Limited], calm_time: float = CALM_TIME
+    ) -> None:
+        """Let time pass until what is ``asked`` has been within its limits for ``calm_time`` s."""
+        if not self.settles(lambda now: are_within(asked(now)), calm_time):
+            why = told(asked(self.loop.snapshot)) or f"not for {calm_time:g} s without a break"
             raise self._aborted(f"{what} not done within {SETTLE_LIMIT:.1f} s: {why}")
 
-    def settles(self, check: Callable[[Snapshot], bool]) -> bool:
-        """Let time pass until ``check`` has held for a while; whether it came to that."""
+    def settles(self, check: Callable[[Snapshot], bool], calm_time: float = CALM_TIME) -> bool:
+        """Let time pass until ``check`` has held for ``calm_time`` s; whether it came to that."""
         loop = self.loop
         calm_since: list[float] = []
 
@@ -272,7 +277,7 @@ class Runner:
                 calm_since.clear()
                 return False
             calm_since.append(loop.state.time)
-            return loop.state.time - calm_since[0] >= CALM_TIME
+            return loop.state.time - calm_since[0] >= calm_time
 
         return self._comes(calm, SETTLE_LIMIT)
 

@@ -42,5 +42,7 @@ class SeenTerrain:
         """How much of it there is, and whether the way is free."""
         z = self.points()[:, 2]
         way = f"blocked: {self.blocked}" if self.blocked else "way free"
+        if not len(z):
+            return f"<SeenTerrain: nothing seen, {way}>"
         area = len(z) * CELL**2
         return f"<SeenTerrain: {area:.1f} m^2, {z.min():.2f} to {z.max():.2f} m, {way}>"

@@ -71,6 +71,10 @@ class Telemetry:
         self.payload = NO_PAYLOAD
         self.qp_failures = self.relaxed_ticks = self.grave_ticks = self.missed_deadlines = 0
 
+    def __repr__(self) -> str:
+        """How many ticks, and of how many it had to give way."""
+        return f"<Telemetry: {self._count} ticks, {self.relaxed_ticks} relaxed>"
+
     def record(self, snapshot: Snapshot, stance: Bool[np.ndarray, "4"], label: str) -> None:
         """Add one tick."""
         i, state = self._count % self._capacity, snapshot.state

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from controller.behaviours.walking import Walking
 from controller.modes import Limited, calm
-from controller.runner import Runner
+from controller.runner import REST_TIME, Runner
 from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS, Gait, find_gait
 from go2_wbc.errors import CommandError, unknown_name
@@ -145,7 +145,7 @@ class Walker:
         def asked(now: Snapshot) -> Limited:
             return {"steps to be ended": (float(not walking.is_finished(now)), 1.0), **calm(now)}
 
-        self._runner.settle(what, asked)
+        self._runner.settle(what, asked, REST_TIME)
 
     def square_up(self) -> bool:
         """Start to put the feet below the hips; returns whether they are."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from go2_wbc.brief import brief
 from go2_wbc.validation import POSITIVE, ranged
 
 
@@ -123,3 +124,5 @@ class FeasibilityLimits:
     stance_position: float = 0.02
     stance_angle: float = 0.05
     end_speed: float = 0.1
+
+    __repr__ = brief

@@ -159,6 +159,8 @@ class BodyTarget:
     w_world: Float[np.ndarray, "3"]
     dw_world: Float[np.ndarray, "3"]
 
+    __repr__ = brief
+
 
 @dataclass(frozen=True, slots=True)
 class Reference:

@@ -102,13 +102,31 @@ THINGS: dict[str, Callable[[], object]] = {
     "Motion": _of("motion"),
     "World": lambda: importlib.import_module("go2_wbc").World(),
     "Reference": _of("reference"),
+    "SeenTerrain": lambda: importlib.import_module("controller.seen_terrain").SeenTerrain(
+        importlib.import_module("go2_wbc.planning.height_map").HeightMap(), ""
+    ),
 }
 MADE_INSIDE = {
     *("Beats", "Certificate", "CheckedMotion", "CompiledPlan", "FeasibilityReport", "Finding"),
     *("Motion", "Outcome", "Snapshot", "Suggestion", "WbcSolution", "MotionInfeasible"),
-    *("QpInfeasible", "Go2WbcError", "of_row", "of", "from_decision", "replaced"),
+    *("QpInfeasible", "Go2WbcError", "of_row", "of", "from_decision", "replaced", "part_names"),
+    *("HeightMap", "Sight", "Footsteps", "HeldFoot", "SeenTerrain", "SavedPhysics", "Telemetry"),
+    *("OdometryCovariance", "Anchor", "BodyTarget", "of_feet", "of_deviations", "Rows", "Bounds"),
+    *("Problem", "ResidualRow", "BuiltIn", "Curve", "PosturePlan", "Health", "PartFault"),
+    *("RobotDescription", "RobotProfile", "MotorModel", "named", "Series", "Departure", "Source"),
+    *(
+        "Key",
+        "OwnEase",
+        "BeatClock",
+        "TimelineData",
+        "Payload",
+        "CertifiedRun",
+        "CertifiedRate",
+        "against",
+        "steady",
+    ),
 }
-"""Results, which nobody but the project makes."""
+"""Results, which nobody but the project makes; and what is made in every tick."""
 EXEMPT = {
     *(f"motions.Timeline({name})" for name in ("keys", "cursor", "clock", "counted", "floor")),
     *(f"motions.Timeline({name})" for name in ("counted_from", "last_start", "shift_beats")),
@@ -130,8 +148,8 @@ EXEMPT |= {
     *("go2_wbc.ContactSchedule.at", "go2_wbc.LocomotionPlanner.why_not_resting"),
 }
 """What is made or asked in every tick is not checked there: what takes it refuses what is wrong."""
-EXEMPT_HUGE = {"go2_wbc.VelocityCommand"}
-"""A velocity is clipped, with a warning, where it is followed."""
+EXEMPT_HUGE = {"go2_wbc.VelocityCommand", "go2_wbc.BodyPose"}
+"""Where it is followed a velocity is clipped, with a warning, and a pose is refused."""
 LEGAL = {("go2-wbc new name", "nonsense")}
 """What is not wrong at all."""
 
@@ -186,6 +204,9 @@ GOOD |= {
     "go2_wbc.JointCommand.asked(q)": lambda: np.zeros(12),
     "go2_wbc.JointCommand.asked(v)": lambda: np.zeros(12),
     "go2_wbc.LocomotionPlanner.update(command)": lambda: thing("go2").command,
+    **{"seed": _value(3), "value": _value(0.5)},
+    **dict.fromkeys(("go2_wbc.Gains(kp)", "go2_wbc.Gains(kd)"), _value((1.0, 1.0, 1.0))),
+    "go2_wbc.JointFriction.by_part(dry)": _value((0.1, 0.1, 0.2)),
     "go2_wbc.ContactSchedule(times)": _value((0.0, 0.5)),
     "go2_wbc.ContactSchedule.at_times(times)": lambda: np.zeros(3),
     "go2_wbc.Recording.load(path)": lambda: thing("recording").save(place() / "a.npz"),

@@ -132,17 +132,49 @@ def _holds(value: object, values: list[object]) -> bool:
 
 
 def public() -> Iterator[tuple[str, Callable[..., Any], Callable[[], object] | None]]:
-    """Every public function and method: its name, it, and what makes the object it is of."""
-    for package in PACKAGES:
-        module = importlib.import_module(package)
-        for name in module.__all__:
-            item = getattr(module, name)
-            if inspect.isclass(item) and not issubclass(item, Enum | Exception):
-                if not inspect.isabstract(item) and name not in MADE_INSIDE:
-                    yield f"{package}.{name}", item, None
-                yield from _methods(f"{package}.{name}", item)
-            elif inspect.isfunction(item):
-                yield f"{package}.{name}", item, None
+    """Every public function and method: its name, it, and what makes the object it is of.
+
+    Public is what a package names, and what a parameter of that takes or a property of it gives.
+    """
+    modules = {name: importlib.import_module(name) for name in PACKAGES}
+    named = {f"{p}.{n}": getattr(modules[p], n) for p in PACKAGES for n in modules[p].__all__}
+    items = {v: k for k, v in named.items() if inspect.isclass(v) or inspect.isfunction(v)}
+    queue = [*items]
+    for item in queue:
+        is_class = inspect.isclass(item) and not issubclass(item, Enum | Exception)
+        calls = [*_calls(items[item], item)] if is_class or inspect.isfunction(item) else []
+        yield from calls
+        further = [kind for _, call, _ in calls for kind in _taken(call)]
+        if is_class:
+            further += [kind for value in vars(item).values() for kind in _taken(value, "return")]
+        for kind in further:
+            if kind not in items:
+                items[kind] = f"{kind.__module__.partition('.')[0]}.{kind.__name__}"
+                queue.append(kind)
+
+
+def _calls(
+    where: str,
+    item: Any,  # noqa: ANN401
+) -> Iterator[tuple[str, Callable[..., Any], Callable[[], object] | None]]:
+    if not inspect.isclass(item) or not (inspect.isabstract(item) or item.__name__ in MADE_INSIDE):
+        yield where, item, None
+    if inspect.isclass(item):
+        yield from _methods(where, item)
+
+
+def _taken(call: Any, only: str = "") -> Iterator[type]:  # noqa: ANN401
+    """Our classes that its parameters take; those of an abstract one are all of its kind."""
+    if only and not isinstance(call, property):
+        return
+    hints = _hints(call.fget or print if isinstance(call, property) else call)
+    kinds = [kind for name, kind in hints.items() if (name == "return") == bool(only)]
+    for kind in kinds:
+        kinds += typing.get_args(kind)
+        if inspect.isclass(kind) and kind.__module__.partition(".")[0] in PACKAGES:
+            kinds += kind.__subclasses__() if inspect.isabstract(kind) else []
+            if getattr(importlib.import_module(kind.__module__), kind.__name__) is kind:
+                yield kind  # and not what a dataclass with slots was made of
 
 
 def _methods(where: str, owner: type) -> Iterator[tuple[str, Any, Callable[[], object] | None]]:

@@ -10,7 +10,11 @@ import pytest
 import go2_wbc
 import motions
 from controller import GO2Controller
+from controller.seen_terrain import SeenTerrain
 from go2_wbc.brief import LONGEST
+from go2_wbc.planning.height_map import HeightMap
+from go2_wbc.plant.mujoco.lidar import LidarConfig
+from go2_wbc.plant.terrain import Course
 from go2_wbc.wbc.config import WbcConfig
 from motions import Timeline, deg
 
@@ -23,6 +27,7 @@ def go2() -> Iterator[GO2Controller]:
 
 
 def test_no_public_value_fills_the_screen(go2: GO2Controller) -> None:
+    seen = go2_wbc.MujocoPlant(terrain=Course.drawn(3), lidar=True, sensors="imu", seed=1)
     checker, timeline = motions.FeasibilityChecker(), motions.load_motion("wave")
     snapshot = checker.model.snapshot(go2.state)
     plan = motions.compile_timeline(timeline, checker.model)
@@ -34,10 +39,25 @@ def test_no_public_value_fills_the_screen(go2: GO2Controller) -> None:
         *(*motions.check(steep).failures, motions.check("wave").series, go2_wbc.GAITS["trot"]),
         *(go2_wbc.Config(), WbcConfig(), go2_wbc.World(), go2_wbc.Recording, motions.Tolerance()),
         *(motions.find_motion("wave"), motions.suggest(steep), go2_wbc.JointCommand.damping(2.0)),
+        *(Course.drawn(3), LidarConfig(), seen.scan(), seen.save(), seen.imu(), seen.contacts()),
+        *(go2_wbc.WholeBodyController(checker.model), SeenTerrain(HeightMap(), "")),
     ]
-    for value in values:
-        one = value[0] if isinstance(value, tuple) else value
+    for value in [*values, *(part for owner in values for part in parts(owner))]:
+        one = value[0] if isinstance(value, tuple) and type(value) is tuple else value
         assert len(repr(one)) <= LONGEST, repr(one)
+        assert " object at 0x" not in repr(one)
+        if not isinstance(one, go2_wbc.MujocoPlant | GO2Controller):
+            assert repr(pickle.loads(pickle.dumps(one))) == repr(one)
+
+
+def is_ours(value: object) -> bool:
+    return type(value).__module__.partition(".")[0] in ("go2_wbc", "motions", "controller")
+
+
+def parts(value: object) -> list[object]:
+    """What of ours the public attributes of a value of ours are."""
+    names = [name for name in dir(value) if is_ours(value) and not name.startswith("_")]
+    return [part for name in names if is_ours(part := getattr(value, name))]
 
 
 def test_a_line_says_what_matters(go2: GO2Controller) -> None:

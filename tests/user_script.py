@@ -43,6 +43,8 @@ from go2_wbc import (
     World,
     load_config,
 )
+from go2_wbc.plant.mujoco.lidar import LidarConfig
+from go2_wbc.plant.terrain import Blocks, Course, Stairs
 from go2_wbc.wbc.problem import SIZE, Rows
 from motions import (
     Beats,
@@ -106,10 +108,12 @@ def greet(
 def drive() -> list[str]:
     """Everything that the robot can be asked."""
     config = Config(wbc=WbcConfig(friction=0.5))
-    plant: Plant = MujocoPlant(friction=0.7, sensors="imu", payload_place=(0.0, 0.0, 0.1))
+    ground = Course((Stairs(count=3, way="both"), Blocks(height=0.04)))
+    plant: Plant = MujocoPlant(terrain=ground, lidar=LidarConfig(rays=200), sensors="imu")
     said = list[str]()
     with GO2Controller(plant=plant, config=config) as go2:
-        done: bool = go2.stand() and go2.walk("trot") and go2.turn_left(deg(90))
+        done: bool = go2.take_over() or go2.stand()
+        done = done and go2.walk("trot") and go2.turn_left(deg(90))
         go2.move(linear_x=0.3, angular_z=0.1)
         go2.stop()
         done = done and go2.move_forward(0.5) and go2.high_five("left") and go2.sit()
@@ -120,6 +124,8 @@ def drive() -> list[str]:
         recording: Recording = go2.recording()
         said += [mode.value, outcome.reason, f"{state.time:.1f}", str(command), str(done)]
         said.append(str(recording.duration + float(recording.tau.max())))
+        said += [str(fault) for fault in go2.health.faults]
+        said.append(f"{go2.terrain.height(1.0, 0.0):.2f} m" if go2.terrain else "blind")
         try:
             go2.play(greet(taps=3))
         except MotionInfeasible as error:

@@ -154,6 +154,7 @@ class Verdict:
         return tuple(sorted(self.curves, key=lambda c: (not c.is_broken, c.least >= c.tight)))
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 class Slider:
     """A parameter that can be chosen on a live page.

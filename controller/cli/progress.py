@@ -11,6 +11,8 @@ TELL_EVERY = 5
 """Iterations of a solver from one look at the line to the next: some ten times a second."""
 TRIES = "motions"
 """Whose log lines of the level INFO say what is tried; they are shown as progress."""
+FIRST_ANSWER = "no plan yet"
+"""How the line of a search begins that stays on a terminal: what binds so far."""
 _LOG = logging.getLogger(TRIES)
 _CLEAR = "\r\x1b[2K"
 
@@ -50,8 +52,11 @@ class ProgressLine:
     def _tell(self, record: logging.LogRecord) -> None:
         """Show what a search tries or has found out."""
         if record.levelno == logging.INFO:
-            self.done(f"{self._text}: {record.getMessage()}")
-            self._show(f"{self._text}: {record.getMessage()}")
+            told = f"{self._text}: {record.getMessage()}"
+            self.done(told)
+            if self._is_live and record.msg.startswith(FIRST_ANSWER):
+                print(f"{_CLEAR}{told}", file=sys.stderr, flush=True)
+            self._show(told)
 
     def _show(self, text: str) -> None:
         if self._is_live:

@@ -26,16 +26,17 @@ from go2_wbc.planning.force_mpc import apply_force_plan
 from go2_wbc.planning.gait_clock import adapt, foot_phase, restart
 from go2_wbc.planning.ground import (
     LATE,
-    LATE_SPEED,
     LEAST_FRICTION,
     MOST_FRICTION,
     Slip,
     carry_ground,
+    carry_higher,
     greatest_speed,
     ground_at,
     ground_below,
     haste,
     is_rough,
+    late_share,
     learn_ground,
     level_friction,
     note_stumble,
@@ -78,6 +79,7 @@ from go2_wbc.planning.trunk import (
     is_settled,
     is_zero,
     level,
+    world_velocity,
 )
 from go2_wbc.planning.walk import (
     GREATEST_HEIGHT,
@@ -142,7 +144,9 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
     else:
         rest_in_place(now, s, config.position_leash, dt)
     carry_ground(s.ground, config.rough, now, dt)
-    correct_height(trunk, now, s.ground.height + (c.height + s.sight.lift), dt)
+    is_uneven = s.sight.uneven_way > 0.0 if s.sight.sees else is_rough(s.ground)
+    carry_higher(s.ground, world_velocity(trunk), is_uneven, s.sight.more_lift, dt)
+    correct_height(trunk, now, s.ground.height + (c.height + s.ground.lift), dt)
 
 
 @subroutine
@@ -172,7 +176,7 @@ def note_liftoffs(
             foot.is_awaited = False
         foot.was_stance = stance[leg]
     height, a, b = s.ground.height, s.ground.slope[0], s.ground.slope[1]
-    learn_ground(s.ground, now, c.foot_radius, met)
+    learn_ground(s.ground, now, c.foot_radius, met, s.delay)
     if s.sight.sees:
         s.ground.height, s.ground.slope[0], s.ground.slope[1] = height, a, b
         return
@@ -264,7 +268,7 @@ def plan(
     observe_slip(s.slip, now, contact, tau, stands, steps, beside, dt)
     note_liftoffs(now, s, c, contact, stance, progress)
     target.friction = level_friction(s.ground, s.slip.friction, LEAST_FRICTION)
-    fill_body(s.trunk, s.ground, c.height + s.sight.lift, target)
+    fill_body(s.trunk, s.ground, c.height + s.ground.lift, target)
     target.p_world[2] = on_leash(s.ground, c.config.rough, target.p_world[2], now)
     level(s.trunk, now, contact, s.is_stepping, dt, target)
     fill_feet(now, s, c, stance, stands, elapsed, remaining, target, m, dt)
@@ -292,6 +296,10 @@ class LocomotionPlanner:
         self._heights = HeightMap() if heights is None else heights
         self._state, self._command = Planner(), Command()
         self.change_gait(gait)
+
+    def __repr__(self) -> str:
+        """With which gait."""
+        return f"<LocomotionPlanner: {self._gait!r}>"
 
     @typed()
     def start(
@@ -336,7 +344,7 @@ class LocomotionPlanner:
 
         The command, and the velocity that is left of one before, must be within its envelope.
         """
-        self._walk = packed(Walk.of(self._model, gait, self._config))
+        self._gait, self._walk = gait, packed(Walk.of(self._model, gait, self._config))
         self._state.planned.next = -np.inf
 
     @property
@@ -347,10 +355,10 @@ class LocomotionPlanner:
     @property
     def is_slowed(self) -> bool:
         """Whether rough ground or late commands keep the robot slower than it is told."""
-        ground, most = self._state.ground, LATE_SPEED if self.is_late else np.inf
-        if ground.rough_way > 0.0:
-            most = min(most, greatest_speed(ground, self._walk.config.rough))
         x, y = self._state.trunk.velocity[:2].tolist()
+        if self.is_late and late_share(x, y) > 1.0 - TIE:
+            return True
+        most = greatest_speed(self._state.ground, self._walk.config.rough)
         return bool(np.hypot(x, y) > most - TIE)
 
     @property

@@ -31,6 +31,8 @@ from jaxtyping import Float, Int
 
 from go2_wbc.algebra.active_set import SINGULAR, constrain
 from go2_wbc.algebra.linear import factorise, solve_factorised, solve_linear
+from go2_wbc.arguments import typed
+from go2_wbc.brief import brief
 from go2_wbc.compilation import subroutine
 from go2_wbc.records import Record
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, Retired, ranged, retires
@@ -43,6 +45,7 @@ INTERVAL = 0.01
 """Time [s] from one solution to the next."""
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @retires(
     enabled=Retired(True, "the forces of every gait are planned ahead"),
@@ -89,6 +92,8 @@ class MpcConfig:
     load_ramp: float = 0.01
     throw_time: float = 0.4
     throw_speed: float = 0.05
+
+    __repr__ = brief
 
 
 class Horizon(Record):

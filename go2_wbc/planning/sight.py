@@ -47,12 +47,9 @@ SPEED, FLIGHT_SPEED = 0.43, 0.32
 """Greatest speed [m/s] on it, and on a flight of stairs: of"""
 FLIGHT, FLIGHT_STEP = 3, 0.13
 """so many steps in sight, and higher than that [m]."""
-LOWERED, LIFT, LIFT_RATE = 0.15, 0.045, 0.1
-"""Fall of the way, per metre, from which on it leads down; by how much [m] the trunk is higher on
-it, and how fast [m/s] it comes there."""
-HIGH_STEP, MOST_LIFT = 0.19, 0.065
-"""Height [m] of a step above which it is higher by as much more, and the most [m]: calves pass over
-20 cm; for 18 cm the legs stand better a little bent."""
+HIGH_STEP, MORE_LIFT = 0.19, 0.02
+"""Height [m] of a step above which the trunk is higher, going down, by as much more, and the most
+[m]: calves pass over 20 cm; for 18 cm the legs stand better a little bent."""
 GREATEST_STEP, GREATEST_GAP = 0.24, 0.38
 """Height [m] of a step and length [m] of a hole that the robot does not try."""
 EVEN, FOOT_CELLS = 0.04, 3
@@ -77,7 +74,7 @@ class Sight(Record):
     Attributes:
         sees: whether the ground below the trunk is known.
         uneven_way: for how far [m] the ground is taken for uneven yet.
-        lift: height [m] by which the trunk is carried higher.
+        more_lift: height [m] by which the trunk is still higher, going down.
         blocked: what ends the way ahead, 0 for nothing.
         end: how far ahead [m] of the CoM that is.
         stopped: for how long [s] it has been so near that the robot has stopped.
@@ -86,7 +83,7 @@ class Sight(Record):
 
     sees: bool
     uneven_way: float
-    lift: float
+    more_lift: float
     blocked: float
     end: float
     stopped: float
@@ -245,7 +242,7 @@ def look(
     sight.sees = fitted_plane(g, m, x, y, yaw, now.foot_radius, plane)
     sight.blocked, sight.is_slowed, g.steeper = 0.0, False, 0.0
     if not sight.sees:
-        sight.uneven_way = 0.0
+        sight.uneven_way = sight.more_lift = 0.0
         return
     speed, cosine, sine = np.hypot(velocity[0], velocity[1]), np.cos(yaw), np.sin(yaw)
     ahead, left = (1.0, 0.0) if speed < _TINY else (velocity[0] / speed, velocity[1] / speed)
@@ -260,10 +257,7 @@ def look(
     g.roughness, g.rough_way, g.high_way = mean, 0.0, 0.0
     climb = g.slope[0] * way[0] + g.slope[1] * way[1]
     g.steeper = 1.0 - FOLLOW if climb > 0.0 else 0.0
-    lift = min(LIFT + max(highest - HIGH_STEP, 0.0), MOST_LIFT)
-    if climb > -LOWERED or sight.uneven_way == 0.0:
-        lift = 0.0
-    sight.lift += min(max(lift - sight.lift, -LIFT_RATE * dt), LIFT_RATE * dt)
+    sight.more_lift = min(max(highest - HIGH_STEP, 0.0), MORE_LIFT)
     sight.blocked, sight.end = way_ahead(m, x, y, way, plane[0])
     is_near = sight.blocked != 0.0 and sight.end < STOP + NEAR_STOP
     sight.stopped = sight.stopped + dt if is_near else 0.0

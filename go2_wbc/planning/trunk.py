@@ -33,6 +33,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.algebra.linear import cross, rotation_by
+from go2_wbc.arguments import typed
 from go2_wbc.compilation import Foreign, subroutine
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.planning.command import finite_number
@@ -96,6 +97,7 @@ LEVEL = BodyPose()
 """The pose of a robot that walks and is asked for nothing else."""
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(highest=NOT_NEGATIVE, roll=NOT_NEGATIVE, pitch=NOT_NEGATIVE, yaw=NOT_NEGATIVE)
 class PoseEnvelope:

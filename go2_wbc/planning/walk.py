@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.arguments import typed
+from go2_wbc.brief import brief
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ConfigError
 from go2_wbc.planning import ground, swing
@@ -25,6 +27,7 @@ LEAST_HEIGHT, GREATEST_HEIGHT = 0.18, 0.34
 """CoM heights [m] between which the legs can step."""
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @retires(
     load_ramp=Retired(0.03, "LocomotionConfig.mpc.load_ramp counts"),
@@ -109,6 +112,8 @@ class LocomotionConfig:
     mpc: MpcConfig = field(default_factory=MpcConfig)
     pose: PoseConfig = field(default_factory=PoseConfig)
     rough: RoughConfig = field(default_factory=RoughConfig)
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a height that the legs have not, or forces without a range."""

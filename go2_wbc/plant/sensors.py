@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Any, final
 
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.brief import brief
 from go2_wbc.robot.estimator import EstimatorConfig, StateEstimator
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import OdometryCovariance, PartFault, RobotState, SensorReading
@@ -34,6 +34,8 @@ class ImuSample:
     quaternion: Float[np.ndarray, "4"]
     gyro: Float[np.ndarray, "3"]
     accelerometer: Float[np.ndarray, "3"]
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,9 +218,7 @@ class Proprioception:
 
     def save(self) -> Mapping[str, Any]:
         """All that the next states depend on, besides the generator."""
-        return MappingProxyType(
-            {"estimator": self._estimator.save(), "waiting": tuple(self._waiting)}
-        )
+        return {"estimator": self._estimator.save(), "waiting": tuple(self._waiting)}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go back to what ``save`` returned."""

@@ -16,6 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.arguments import typed
+from go2_wbc.brief import brief
 from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Rule, ranged
 
@@ -95,6 +97,7 @@ class Terrain(ABC):
         return tuple(Block.slab(a, b - a, self.floor_height, 0.0) for a, b in spans if self.pits)
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE, count=NOT_NEGATIVE, clear_radius=NOT_NEGATIVE, seed=NOT_NEGATIVE)
 class Boxes(Terrain):
@@ -145,6 +148,7 @@ TREAD = 0.04
 """Thickness [m] of a step with an open riser."""
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE)
 class Stairs(Terrain):
@@ -204,6 +208,7 @@ class Stairs(Terrain):
         return tuple(blocks)
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE)
 class Blocks(Terrain):
@@ -296,6 +301,7 @@ STRIPS = 16
 """Flat strips of which a wave is made."""
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE)
 class Waves(Terrain):
@@ -355,6 +361,7 @@ class _Pit(Terrain):
         return ((self.start, self.end),)
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE, uneven=NOT_NEGATIVE, seed=NOT_NEGATIVE)
 class Stones(_Pit):
@@ -419,6 +426,7 @@ class Gap(_Pit):
         return ()
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 class Course(Terrain):
     """Several terrains, one behind the other.
@@ -429,18 +437,26 @@ class Course(Terrain):
 
     parts: tuple[Terrain, ...]
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         """Raise ConfigError for a part without an end, or for none."""
         if not self.parts or not all(math.isfinite(part.end) for part in self.parts):
             raise ConfigError(f"Course.parts must be terrains with an end, got {self.parts!r}")
 
     @staticmethod
+    @typed()
     def drawn(seed: int, height: float = 0.12, angle: float = 0.3, length: float = 12.0) -> Course:
         """A random one: stairs, blocks, ramps and waves, until it is ``length`` [m] long.
 
         Each is drawn between half of the ``height`` of a step [m] or the ``angle`` of a slope [rad]
         and all of it; waves may be as high as a step.
+
+        Raises:
+            ConfigError: for a negative seed, or what no part of it takes.
         """
+        if seed < 0:
+            raise ConfigError(f"seed must be at least 0, got {seed}")
         rng, parts, total = np.random.default_rng(seed), [], 0.0
         while total < length:
             kind, share = int(rng.integers(4)), float(rng.uniform(0.5, 1.0))

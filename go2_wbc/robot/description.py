@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
+from go2_wbc.brief import brief
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.records import Array3, ArrayNx3
@@ -55,6 +56,8 @@ class RobotDescription:
     speeds: tuple[float, ...]
     mass: float
     origins: tuple[tuple[float, ...], ...]
+
+    __repr__ = brief
 
     def distance(self, first: str, second: str) -> float:
         """Between two neighbouring joints of a leg, or two hips [m]."""

@@ -44,7 +44,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -333,13 +332,11 @@ class StateEstimator:
 
     def save(self) -> Mapping[str, Any]:
         """All that the next estimates depend on, besides the readings."""
-        return MappingProxyType(
-            {
-                "time": self._time,
-                "state": EstimatorState.of(self._state.row.copy()),
-                "watch": None if self.watch is None else self.watch.save(),
-            }
-        )
+        return {
+            "time": self._time,
+            "state": EstimatorState.of(self._state.row.copy()),
+            "watch": None if self.watch is None else self.watch.save(),
+        }
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go back to what ``save`` returned."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from go2_wbc.brief import brief
 from go2_wbc.errors import ConfigError
 from go2_wbc.validation import POSITIVE, ranged
 
@@ -105,6 +106,8 @@ class EstimatorConfig:
     landing_time: float = 0.05
     compliance: float = 5e-5
     longest_step: float = 0.1
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         """Raise ConfigError for forces the wrong way round."""

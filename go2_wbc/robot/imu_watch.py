@@ -46,7 +46,8 @@ JUMP, SEEN, JUMP_LASTS, LONGEST_JUMP = 0.3, 0.4, 0.03, 0.25
 """Change of the gyro from one reading to the next [rad/s] that may be an error; what feet that do
 not jump along have to show of it [m^2/s^2], for how long at least [s], and at most."""
 GOES_ON = 0.25
-"""Share of it by which the next reading changes alike, if what has changed is the turning."""
+"""Share of it by which the reading before or after changes alike, if it is the turning that has: a
+foot that comes down hard turns the trunk for several."""
 JUMP_SHARE, NO_JUMP, JUMP_EXPLAINED = (0.7, 1.4), 0.5, 0.85
 """Range of the share of the jump that they lack, if it is an error; share below which it is none;
 and the share of their squared residual that an error explains: 0.97 of most, a slip 0.8."""
@@ -80,6 +81,7 @@ class WatchedImu(Record):
         turning, turned, residual: normal equations of the gyro's error, and the squared residual.
         gyro_off, gyro_time: the error that is taken off [rad/s], for how long there has been one.
         refining: for how long what is left is still measured [s].
+        change: of the gyro from the last reading but one to the last [rad/s].
         jump, jump_time: the last of the gyro [rad/s], and for how long it is looked at [s].
         jump_seen, jump_lacks, jump_residual: sums of f . f, f . e and e . e, where feet that stand
             would seem to move apart by f, if it were an error, and do so by e [m^2/s^2].
@@ -103,6 +105,7 @@ class WatchedImu(Record):
     gyro_off: Array3
     gyro_time: float
     refining: float
+    change: Array3
     jump: Array3
     jump_time: float
     jump_seen: float
@@ -228,9 +231,8 @@ def judge_jump(m: WatchedImu, change: V3, dt: float) -> None:
     With f and e of each pair the share that they lack is sum f . e / sum f . f, least squares. What
     a landing turns goes on to turn in the next reading.
     """
-    if m.jump_time == dt and dot(change, triple(m.jump)) > GOES_ON * dot(
-        triple(m.jump), triple(m.jump)
-    ):
+    last, jump, size = triple(m.change), triple(m.jump), dot(change, change)
+    if m.jump_time < 1.5 * dt and dot(change, jump) > GOES_ON * dot(jump, jump):
         m.jump_time = 0.0
     if m.jump_time > 0.0:
         m.jump_time += dt
@@ -243,7 +245,9 @@ def judge_jump(m: WatchedImu, change: V3, dt: float) -> None:
             take_off(m, triple(m.jump), m.jump_time)
         elif min(share, any_share) < NO_JUMP or m.jump_time > LONGEST_JUMP:
             m.jump_time = 0.0
-    if m.jump_time == 0.0 and m.stood >= CALM and dot(change, change) > JUMP**2:
+    has_begun = dot(change, last) > GOES_ON * size
+    put(change, m.change)
+    if m.jump_time == 0.0 and m.stood >= CALM and size > JUMP**2 and not has_begun:
         put(change, m.jump)
         m.jump_time, m.jump_seen, m.jump_lacks, m.jump_residual = dt, 0.0, 0.0, 0.0
         m.any_seen = m.any_lacks = 0.0

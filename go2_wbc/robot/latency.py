@@ -39,6 +39,8 @@ ms, the lag found with 0.2 s went from 4 to 14 ms and back, and 3 of 5 robots fe
 m/s; with this it stays in the middle, and none did."""
 BETTER = 0.01
 """Share of the torques' own change by which another lag must fit better."""
+READ = 1.0
+"""Lag that is none of the commands: by so much readings may be old."""
 WORST_FIT = 0.5
 """Share of that change up to which a lag may be off: motors that do not obey tell of none."""
 LEAST_CHANGE = 1e-3
@@ -55,6 +57,7 @@ class Lag(Record):
         misfit: mean square [N^2 m^2] of what was measured less what was asked, of each lag.
         change: the same of the torques asked for, from the first lag to the last.
         ticks: the lag that fits, in control periods.
+        acted: the one that fits this tick alone, if commands are late.
     """
 
     tau_asked: Float[np.ndarray, "11 12"]
@@ -63,6 +66,7 @@ class Lag(Record):
     misfit: Float[np.ndarray, "11"]
     change: float
     ticks: float
+    acted: float
 
 
 @kernel
@@ -83,9 +87,10 @@ def note_command(
 @kernel
 def observe_lag(s: Lag, tau: Foreign[Float[np.ndarray, "12"]], dt: float) -> None:
     """Compare the torques measured now with those that were asked for."""
+    s.acted = s.ticks
     if s.known < LAGS:
         return
-    share, change = min(dt / MEMORY, 1.0), 0.0
+    share, change, least, nearest = min(dt / MEMORY, 1.0), 0.0, np.inf, 0
     for d in range(LAGS):
         square = 0.0
         for n in range(12):
@@ -93,6 +98,10 @@ def observe_lag(s: Lag, tau: Foreign[Float[np.ndarray, "12"]], dt: float) -> Non
             if d == LAGS - 1:
                 change += (s.tau_asked[0, n] - s.tau_asked[d, n]) ** 2 / 12
         s.misfit[d] += share * (square - s.misfit[d])
+        if square < least:
+            least, nearest = square, d
+    if s.ticks > READ:
+        s.acted = nearest
     s.change += share * (change - s.change)
     best = 0
     for d in range(LAGS):
@@ -136,6 +145,11 @@ class Latency:
     def delay(self) -> float:
         """Time [s] after which a command acts, as far as it is known."""
         return self.ticks * self._period
+
+    @property
+    def acted(self) -> int:
+        """How many control periods before now that command was given which has just acted."""
+        return int(self._lag.acted)
 
     def note(self, tau: Float[np.ndarray, "12"], qdd: Float[np.ndarray, "18"]) -> None:
         """The torques [N m] that have just been asked for, and what they are to make."""

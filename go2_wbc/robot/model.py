@@ -95,6 +95,10 @@ class RobotModel:
         self._carried = NO_PAYLOAD, RigidBodies()
         self._read_constants()
 
+    def __repr__(self) -> str:
+        """Of which robot, and how heavy."""
+        return f"<RobotModel: {self.profile.title}, {self.mass:.2f} kg>"
+
     def _read_constants(self) -> None:
         model = self.pin_model
         self.gravity = float(-model.gravity.linear[2])

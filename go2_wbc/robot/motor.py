@@ -45,6 +45,7 @@ from typing import Annotated
 import numpy as np
 from jaxtyping import Float, Int
 
+from go2_wbc.arguments import typed
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.legs import JOINT_NAMES
@@ -201,6 +202,7 @@ def note_peaks(
         peaks[2, n] = max(peaks[2, n], abs(tau[n]) / max(given, LEAST_SHARE * motor.peak[n]))
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(NOT_NEGATIVE, dry=NOT_NEGATIVE, viscous=NOT_NEGATIVE, transition=POSITIVE)
 class JointFriction:
@@ -241,6 +243,7 @@ class JointFriction:
         return JointFriction(dry=(0.0,) * 12)
 
     @staticmethod
+    @typed()
     def by_part(
         dry: tuple[float, float, float], viscous: tuple[float, float, float] = (0.0, 0.0, 0.0)
     ) -> JointFriction:

@@ -29,6 +29,8 @@ import numpy as np
 from jaxtyping import Bool
 
 from go2_wbc.algebra.linear import cross, plus, plus_scaled, put, solve_linear, triple
+from go2_wbc.arguments import typed
+from go2_wbc.brief import brief
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.records import V3, Array3, Array6, Array12, Array18, Record, packed
 from go2_wbc.robot.model import RobotModel
@@ -43,6 +45,7 @@ NOTHING = 0.02
 """Mass [kg] at which a belief that fades has ended."""
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE, release=SHARE, middle=FINITE)
 class PayloadConfig:
@@ -90,6 +93,8 @@ class PayloadConfig:
     least_height: float = 0.15
     most_rise: float = 0.1
     most_speed: tuple[float, float] = (1.5, 0.4)
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a middle that is not in the robot."""

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from go2_wbc.brief import brief
 from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.records import V3, Array6, Array12, ArrayNx3
 
@@ -71,6 +72,8 @@ class RobotProfile:
     underside: tuple[V3, ...]
     motions: Mapping[str, Mapping[str, float]] = field(default_factory=dict, hash=False)
     config: Mapping[str, Any] = field(default_factory=dict, hash=False)
+
+    __repr__ = brief
 
     @property
     def stand_pose(self) -> Array6:

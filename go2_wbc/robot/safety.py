@@ -14,6 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from go2_wbc.arguments import typed
+from go2_wbc.brief import brief
 from go2_wbc.compilation import Foreign, kernel
 from go2_wbc.records import Array4, Array12, Array18, Array19, ArrayNx3
 from go2_wbc.robot.profile import RobotProfile, find_profile
@@ -61,6 +63,7 @@ def heights(now: Snapshot, underside: ArrayNx3) -> tuple[float, float]:
     return height - lowest, height + clearance - lowest + now.foot_radius
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE)
 class SafetyConfig:
@@ -103,6 +106,8 @@ class SafetyConfig:
     stale_limit: float = 0.03
     qp_patience: int = 10
     grave_limit_time: float = 0.1
+
+    __repr__ = brief
 
     def greatest_tilt(self, *, is_astray: bool) -> float:
         """Tilt [rad] beyond which a robot has fallen: of two limits the lower one, if astray."""

@@ -181,6 +181,8 @@ class OdometryCovariance:
     pose: Float[np.ndarray, "6 6"]
     twist: Float[np.ndarray, "6 6"]
 
+    __repr__ = brief
+
     @classmethod
     def of_deviations(
         cls, position: float, turn: float, linear: float, angular: float

@@ -28,6 +28,7 @@ GREATEST_GAIN = 1e6
 """(2 / dt)^2 [1/s^2] at 500 ticks a second: a loop with more than that swings itself up."""
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(between(0.0, GREATEST_GAIN))
 class Gains:

@@ -178,6 +178,12 @@ class WholeBodyController:
         if extra_tasks and backend == "placo":
             raise ConfigError("the placo back end has tasks of its own and takes no extra ones")
 
+    def __repr__(self) -> str:
+        """With which back end and solver, and how many tasks."""
+        return (
+            f"<WholeBodyController: {self.backend_name}, {self._solver}, {len(self.tasks)} tasks>"
+        )
+
     def _back_end(self, name: str) -> tuple[str, Callable[[Problem], Array30]]:
         """Which solver it has, and how it solves an assembled problem."""
         solver = check_solver(self.config.solver)

@@ -136,8 +136,8 @@ class Reading:
 
     def __str__(self) -> str:
         return (
-            f"{self.name} of {self.subject} at {self.time:.2f} s: {abs(self.value):.3g} "
-            f"{self.unit}, at most {self.limit:.3g}"
+            f"{self.name} of {self.subject} at {self.time:.2f} s: {abs(self.value):.3g}"
+            f"{self.unit and f' {self.unit}'}, at most {self.limit:.3g}"
         )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.brief import brief
 from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.legs import JOINT_NAMES, LEGS
 from go2_wbc.robot.model import RobotModel
@@ -38,6 +39,8 @@ class Forces:
     zmp: Float[np.ndarray, "n 2"]
     wrench: Float[np.ndarray, "n 6"]
     v_motors: Float[np.ndarray, "n 12"] | None = None
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True, slots=True)

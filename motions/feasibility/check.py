@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -180,6 +181,14 @@ class FeasibilityChecker:
         self._loaded = _loaded(self.model, self.world.worst)
         self._collision = SelfCollision(self.model)
         self._hulls = hulls_of(self.model.description)
+
+    def __repr__(self) -> str:
+        """Of which robot, in which world."""
+        return f"<FeasibilityChecker: {self.model!r}, {self.world!r}>"
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """A process pool loads it anew, without ``progress``."""
+        return partial(FeasibilityChecker, self.model, self._limits, world=self.world), ()
 
     @typed("check")
     def plan(self, motion: Playable, *, check: bool = True) -> MotionPlan:

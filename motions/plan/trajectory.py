@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Bool, Float
 
+from go2_wbc.brief import brief
 from go2_wbc.errors import MotionError
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.recording import true_runs
@@ -64,6 +65,8 @@ class Trajectory:
     p_feet: Float[np.ndarray, "n 4 3"]
     miss: Float[np.ndarray, "n 4"]
     is_dynamic: Bool[np.ndarray, " n"]
+
+    __repr__ = brief
 
 
 def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:

@@ -18,6 +18,7 @@ from go2_wbc.errors import (
     CommandError,
     ConfigError,
     DescriptionError,
+    Go2WbcError,
     ModelMismatch,
     SolverUnavailable,
 )
@@ -31,6 +32,7 @@ from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.problem import SIZE, Rows
 from go2_wbc.wbc.tasks import Task
+from motions import Timeline
 from tests.controller.plants import StillPlant, WatchedPlant
 from tests.pages import run_python
 
@@ -221,6 +223,26 @@ def test_a_number_that_is_not_finite_is_refused_by_name(
     assert lying.command.is_zero
 
 
+ANGLES: dict[str, Callable[[GO2Controller, float], object]] = {
+    "turn_left": lambda go2, angle: go2.turn_left(angle),
+    "turn_right": lambda go2, angle: go2.turn_right(angle),
+    "initial_yaw": lambda _, angle: MujocoPlant(initial_yaw=angle),
+    "turn": lambda _, angle: Timeline().turn(angle),
+    "walk": lambda _, angle: Timeline().walk(turn=angle),
+    "path": lambda _, angle: Timeline().path([(0.2, 0.0, angle)]),
+    "body": lambda _, angle: Timeline().body(yaw=angle, over=1.0),
+    "spin_jump": lambda _, angle: Timeline().spin_jump(angle),
+}
+
+
+@pytest.mark.parametrize("way", ANGLES)
+def test_degrees_are_asked_back_wherever_an_angle_is_taken(way: str, lying: GO2Controller) -> None:
+    for angle in (30.0, 45.0, 60.0, 90.0, -90.0, 180.0, 270.0, 360.0, 720.0):
+        with pytest.raises(Go2WbcError, match=r"deg\(|from -3.14 to 3.14"):
+            ANGLES[way](lying, angle)
+    assert lying.mode is Mode.LYING
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
@@ -230,7 +252,6 @@ def test_a_number_that_is_not_finite_is_refused_by_name(
         (lambda go2: go2.high_five(hold=inf), "hold must be 0.5 to 30 s, got inf"),
         (lambda go2: go2.high_five(hold=-inf), "hold must be 0.5 to 30 s, got -inf"),
         (lambda go2: go2.wait(-0.1), r"seconds must be from 0 to 1e\+06 s, got -0.1"),
-        (lambda go2: go2.turn_left(30.0), "30 rad looks like degrees: write deg"),
         (lambda go2: go2.turn_right(6.3), "-6.3 rad looks like degrees: write deg"),
         (lambda go2: go2.move_forward(1e9), r"distance must be within \+-100 m, got 1"),
         (lambda go2: go2.high_five("up"), "unknown side 'up'; valid: left, right"),

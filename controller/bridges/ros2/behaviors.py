@@ -21,6 +21,7 @@ ORDERS: Mapping[str, Callable[[GO2Controller], bool]] = {
     "lie_down": lambda go2: go2.lie_down(),
     "high_five": lambda go2: go2.high_five(),
     "recover": lambda go2: go2.recover(),
+    "take_over": lambda go2: go2.take_over(),
 }
 """What happens for a name; ``up`` and ``stand`` are the same."""
 COMMANDS = (*ORDERS, STOP, DAMP)

@@ -92,6 +92,10 @@ class GO2ControllerNode(ros.Node):
         """Stand, not walking."""
         return self._behave("up")
 
+    def take_over(self) -> bool:
+        """Balance a robot that stands already. False if it lies, as where a server begins."""
+        return self._behave("take_over")
+
     def walk(self) -> bool:
         """Enter walking mode: ``move`` works from now on."""
         return self._behave("walk")

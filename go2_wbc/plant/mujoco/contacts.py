@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from go2_wbc.brief import brief
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.mujoco.layout import FOREIGN, MujocoLayout
 
@@ -27,6 +28,8 @@ class FootContacts:
 
     p_world_contact: Float[np.ndarray, "4 3"]
     v_world_contact: Float[np.ndarray, "4 3"]
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +53,8 @@ class Contacts:
     normals: Float[np.ndarray, "n 3"]
     p_world_com: Float[np.ndarray, "3"]
     twists: Float[np.ndarray, "4 6"]
+
+    __repr__ = brief
 
     @staticmethod
     def of(data: mujoco.MjData, layout: MujocoLayout) -> Contacts:

@@ -14,13 +14,13 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import ConfigError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant.base import Scan
@@ -35,6 +35,7 @@ ROUNDING = 1e-9
 GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE, noise=NOT_NEGATIVE, latency=NOT_NEGATIVE)
 class LidarConfig:
@@ -77,6 +78,7 @@ class LidarConfig:
         return np.column_stack([cosine, sine * np.sin(turns + turn), sine * np.cos(turns + turn)])
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE, noise=NOT_NEGATIVE, latency=NOT_NEGATIVE)
 class DepthConfig:
@@ -194,7 +196,7 @@ class RangeSensor:
     def save(self) -> Mapping[str, Any]:
         """All that the next scans depend on, besides the robot."""
         state = self._rng.bit_generator.state
-        return MappingProxyType({"noise": state, "told": tuple(self._told), "next": self._next})
+        return {"noise": state, "told": tuple(self._told), "next": self._next}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go back to what ``save`` returned."""

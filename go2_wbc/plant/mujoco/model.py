@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 import mujoco
 import numpy as np
 
+from go2_wbc.arguments import typed
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant.mujoco.visuals import add_visuals
@@ -39,6 +40,7 @@ _POINT = 1e-5  # kg, of a link that stands for a frame only
 _FLOOR_HALF_SIZE = (0.0, 0.0, 0.05)  # m; 0 is infinite, the third is the rendered grid spacing
 
 
+@typed()
 @dataclass(frozen=True, slots=True)
 @ranged(NOT_NEGATIVE)
 class JointDynamics:

@@ -24,11 +24,12 @@ from go2_wbc.plant.terrain import Terrain
 from go2_wbc.robot.description import BASE_LINK, RobotDescription, find_description
 from go2_wbc.robot.motor import MotorModel, require_motor
 from go2_wbc.robot.state import JointCommand, RobotState
-from go2_wbc.validation import FINITE, NOT_NEGATIVE, POSITIVE, between, ranged
+from go2_wbc.validation import FINITE, NOT_NEGATIVE, POSITIVE, Rule, between, ranged
 from go2_wbc.world import RANGES
 
 # Dry rubber on a hard floor; Unitree publishes none. The prototype's runs used it.
 DEFAULT_FRICTION = 0.8
+HEADING = Rule("within 2 pi rad (degrees: deg(90))", lambda yaw: abs(yaw) <= math.tau)
 
 
 @typed()
@@ -39,7 +40,8 @@ DEFAULT_FRICTION = 0.8
     control_period=POSITIVE,
     payload=between(0.0, 4.0 * RANGES["payload"][1]),
     **{name: between(*RANGES[name]) for name in ("friction", "mass_scale", "delay")},
-    initial_yaw=FINITE,
+    initial_yaw=HEADING,
+    initial_joint_noise=between(0.0, 1.0),
     payload_place=FINITE,
 )
 class PlantSetup:
@@ -101,6 +103,10 @@ class SavedPhysics(NamedTuple):
     senses: Mapping[str, Any] | None
     faults: Mapping[str, Any]
     lidar: Mapping[str, Any] | None = None
+
+    def __repr__(self) -> str:
+        """After how many ticks, and what waits."""
+        return f"SavedPhysics(ticks={self.ticks}, pushes={len(self.pushes)})"
 
 
 def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout, MotorModel, RobotDescription]:

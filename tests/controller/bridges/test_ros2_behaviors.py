@@ -81,6 +81,15 @@ def test_what_did_not_happen_is_answered_with_the_reason() -> None:
     assert (answer.ok, answer.reason) == (False, "fallen: recover")
 
 
+def test_a_robot_that_lies_is_not_taken_over_and_one_that_stands_is(go2: GO2Controller) -> None:
+    (answer,) = ordered(jobs_of(go2), "take_over")
+    assert not answer.ok
+    assert answer.reason.startswith("the robot does not stand: it lies, its base 0.")
+    assert go2.mode is Mode.LYING
+    assert ordered(jobs_of(go2), "up")[0].ok
+    assert ordered(jobs_of(go2), "take_over")[0].ok
+
+
 def test_a_second_order_is_refused_at_once_and_the_first_goes_on() -> None:
     go2 = FakeGo2()
     jobs, first, second = jobs_of(go2), [], []

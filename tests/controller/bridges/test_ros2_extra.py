@@ -14,10 +14,13 @@ from tests.controller.plants import StillPlant, is_limp
 ROOT = Path(__file__).resolve().parents[3]
 
 
-def without_ros(code: str) -> subprocess.CompletedProcess[str]:
-    """Run ``code`` in a fresh Python in which there is no rclpy."""
+HIDDEN = "for name in ('rclpy', 'cyclonedds.core'): sys.modules[name] = None"
+
+
+def without_extras(code: str) -> subprocess.CompletedProcess[str]:
+    """Run ``code`` in a fresh Python in which there is no rclpy and no CycloneDDS."""
     return subprocess.run(
-        [sys.executable, "-c", f"import sys; sys.modules['rclpy'] = None; {code}"],
+        [sys.executable, "-c", f"import sys\n{HIDDEN}\n{code}"],
         cwd=ROOT,
         capture_output=True,
         text=True,
@@ -25,15 +28,25 @@ def without_ros(code: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_without_the_extra_the_command_names_the_line_that_installs_it() -> None:
-    run = without_ros("from controller.cli.main import main; sys.exit(main(['ros2']))")
+DRIVE = "unitree-drive --interface lo --domain 1 --i-have-the-remote-in-hand"
+
+
+@pytest.mark.parametrize(
+    ("command", "extra"),
+    [("ros2", "ros2"), ("demo --ros2", "ros2"), ("unitree-sim", "unitree"), (DRIVE, "unitree")],
+)
+def test_without_the_extra_a_command_says_in_a_line_what_installs_it(
+    command: str, extra: str
+) -> None:
+    run = without_extras(f"import controller.cli.main as m; sys.exit(m.main({command.split()}))")
     assert run.returncode == ExitCode.RUNTIME
-    assert 'pip install "go2-wbc[ros2]"' in run.stderr
-    assert "Traceback" not in run.stderr
+    (line,) = run.stderr.splitlines()
+    assert line.startswith("go2-wbc: ")
+    assert line.endswith(f'python -m pip install "go2-wbc[{extra}]"')
 
 
 def test_without_the_extra_the_client_is_an_error_of_ours() -> None:
-    run = without_ros("import controller.bridges.ros2 as bridge; bridge.GO2ControllerNode")
+    run = without_extras("import controller.bridges.ros2 as bridge; bridge.GO2ControllerNode")
     assert "MissingDependency: ROS 2 is not here" in run.stderr.splitlines()[-1]
 
 

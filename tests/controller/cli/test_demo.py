@@ -364,6 +364,22 @@ def test_while_something_is_solved_the_line_says_how_far_that_is(
     ]
 
 
+def test_of_what_a_search_says_the_first_answer_stays_on_a_terminal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It was cut to the terminal's width and gone after a tenth of a second."""
+    from motions.dynamics.search import _log
+
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    with ProgressLine() as line:
+        line.update(0.0, "leap")
+        _log.info("trying to begin from %s", "a guess")
+        _log.info("no plan yet; what binds: %s", "torque share of FL_calf at 0.30 s " * 3)
+        line.solving(1, 1.0)
+    stays = [part.strip("\r") for part in capsys.readouterr().err.split("\x1b[2K") if "\n" in part]
+    assert stays == [f"leap: no plan yet; what binds: {'torque share of FL_calf at 0.30 s ' * 3}\n"]
+
+
 @pytest.mark.parametrize(("is_terminal", "is_quiet"), [(False, False), (True, True)])
 def test_into_a_pipe_or_beside_json_nothing_is_said_of_solving(
     is_terminal: bool,

@@ -9,6 +9,7 @@ import pytest
 from go2_wbc.algebra.linear import triple
 from go2_wbc.compilation import plain
 from go2_wbc.legs import FOOT_NAMES
+from go2_wbc.robot.imu_watch import WatchedImu, judge_jump
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.sensor_watch import SensorWatch, leg_motion, less_rolling
@@ -220,6 +221,17 @@ def test_a_landing_turns_a_robot_on_and_an_error_comes_at_once(
     turns[250], turns[251:] = [0.4, 0.0, 0.0], [next_turn, 0.0, 0.0]
     _, faults = watched(*(reading(k, gyro=w) for k, w in enumerate(turns)))
     assert [fault.part for fault in faults] == named
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "may_err"), [(0.0, 0.0, True), (0.37, 0.0, False), (0.0, 0.37, False)]
+)
+def test_what_turns_for_two_readings_is_no_jump(before: float, after: float, may_err: bool) -> None:
+    """Robots whose commands are late land hard, and lost their gyro by it."""
+    imu = WatchedImu(stood=1.0)
+    for n, change in enumerate((0.0, before, 0.43, after, 0.0)):
+        judge_jump(imu, (change, 0.0, 0.0), DT * (1.0 + 1e-12 * n))
+    assert bool(imu.jump_time > 0.0) is may_err
 
 
 def test_a_gyro_that_drifts_off_is_named_too() -> None:
