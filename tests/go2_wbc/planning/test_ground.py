@@ -186,21 +186,27 @@ def test_an_upright_cone_lies_within_that_about_the_normal_of_a_slope(friction: 
 
 
 @pytest.mark.parametrize(
-    ("slope", "is_uneven", "lift"),
-    [(1.1, True, LIFT), (0.9, True, 0.0), (-1.1, True, 0.0), (1.1, False, 0.0)],
+    ("slope", "is_uneven", "more", "lift"),
+    [
+        (1.1, True, 0.0, LIFT),
+        (1.1, True, 0.02, LIFT + 0.02),
+        (0.9, True, 0.0, 0.0),
+        (-1.1, True, 0.02, 0.0),
+        (1.1, False, 0.0, 0.0),
+    ],
 )
 def test_down_uneven_ground_it_goes_with_a_higher_trunk(
-    slope: float, is_uneven: bool, lift: float
+    slope: float, is_uneven: bool, more: float, lift: float
 ) -> None:
     """And back where it no longer leads down; it gets there no faster than told."""
     ground = Ground(slope=[0.0, slope * LOWERED])
-    carry_higher(ground, (0.0, -0.5), is_uneven, TICK)
+    carry_higher(ground, (0.0, -0.5), is_uneven, more, TICK)
     assert ground.lift == pytest.approx(min(lift, LIFT_RATE * TICK))
     for _ in range(500):
-        carry_higher(ground, (0.0, -0.5), is_uneven, TICK)
+        carry_higher(ground, (0.0, -0.5), is_uneven, more, TICK)
     assert ground.lift == lift
     for _ in range(500):
-        carry_higher(ground, (0.0, 0.0), is_uneven, TICK)
+        carry_higher(ground, (0.0, 0.0), is_uneven, more, TICK)
     assert ground.lift == 0.0
 
 
