@@ -43,7 +43,7 @@ SOLVERS = ("active_set", "daqp", "proxqp", "quadprog")
 START_NOISE = 0.05
 """Standard deviation [rad] of the joint angles from which the robot starts with ``--seed``."""
 TITLE = "Go2: stand, sit, walk, turn, high five"
-SEEING = "Go2: by sight over a {}"
+SEEING = "Go2: {} by sight"
 FILES: Mapping[str, str] = {
     "demo.npz": "recording (NumPy)",
     "report.json": "report",
