@@ -12,8 +12,8 @@ begin at ``FIRST_SEED``.
 - saturated: share of ticks [%] in which some motor gives all it has at its speed;
 - rough torque: root mean square of the change of a torque in 0.1 s [N m].
 
-By sight the robot has a lidar and lives on its own sensors. In front of a wall, a gap of 60 cm and
-a step of 30 cm ``move_forward`` must say that it stopped, without a touch.
+By sight the robot has a lidar or a depth camera and lives on its own sensors. In front of a wall,
+a gap of 60 cm and a step of 30 cm ``move_forward`` must say that it stopped, without a touch.
 
 Reversals are ``COMMANDS``, each for ``EACH`` seconds, ``ROUNDS`` times, on level ground: what is
 told is the mean over time of the length of velocity less command, in the heading frame; also with
@@ -102,7 +102,8 @@ class Way:
         length: where the robot has to come [m]; None for behind the end of the terrain.
         heading: at the start [rad].
         bar: least share of the trials that are done.
-        sees: whether the robot has a lidar; it then lives on its own sensors.
+        sees: "lidar" or "depth", by which the robot sees; it then lives on its own sensors.
+        returns: whether it turns there and walks back.
     """
 
     name: str
@@ -112,7 +113,8 @@ class Way:
     length: float | None = None
     heading: float = 0.0
     bar: float | None = 0.95
-    sees: bool = False
+    sees: str = ""
+    returns: bool = False
 
     @property
     def study(self) -> Study:
@@ -139,7 +141,8 @@ class Way:
         drawn = {"friction": friction, "mass_scale": mass, "initial_yaw": self.heading + yaw}
         own = IMU if self.sees else sensors
         more = {"seed": seed, "sensors": own, "initial_joint_noise": JOINT_NOISE}
-        plant = MujocoPlant(terrain=terrain, lidar=self.sees, **drawn, **more)
+        eyes = {self.sees: True} if self.sees else {}
+        plant = MujocoPlant(terrain=terrain, **eyes, **drawn, **more)
         q = plant.truth().q.copy()
         q[0] += float(rng.uniform(*PLACE))
         plant.place(q)
@@ -149,13 +152,17 @@ class Way:
 def measure_way(trial: Trial, found: TrialResult, way: Way, first_seed: int = FIRST_SEED) -> None:
     """Walk the way; see the module's docstring for what is measured."""
     seed = first_seed + trial.seed
-    length = way.terrain(seed).end + BEYOND if way.length is None else way.length
+    behind = (way.terrain(seed).end + BEYOND) / abs(math.cos(way.heading))
+    length = way.length or behind
     with TrialRobot(way.plant(seed, trial.sensors)) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         robot.truth.clear()
         try:
             time = _walked(robot, way.speed, length)
+            if way.returns:
+                robot.require(robot.go2.turn_left(math.pi))
+                time = 0.5 * (time + _walked(robot, way.speed, length))
         finally:
             found.values |= _measured(robot.truth.recording())
         found.values["speed"] = 100.0 * (1.0 - length / (time * abs(way.speed)))
@@ -304,6 +311,7 @@ WAYS = (
     Way("boxes", "boxes up to 12 cm, 0.5 m/s", _boxes, length=3.5),
     Way("course", "random course of 12 m, 0.5 m/s", Course.drawn, bar=None),
 )
+_UP = _at(Stairs(0.16, 6, 0.31))
 SEEING = (
     Way("seen-stairs-13", "6 stairs up and down, 13 cm, 0.3 m/s", _stairs(0.13), 0.3),
     Way("seen-stairs-16", "16 cm", _stairs(0.16), 0.3, bar=1.0),
@@ -311,22 +319,24 @@ SEEING = (
     Way("seen-stairs-20", "20 cm", _stairs(0.20), 0.3, bar=0.8),
     Way("seen-stairs-down", "18 cm down only", _at(Stairs(0.18, 6, 0.31, way=DOWN)), 0.3, 3.5),
     Way("seen-stairs-aslant", "16 cm, aslant by 20 deg", _stairs(0.16), 0.3, None, ASLANT, 0.9),
+    Way("seen-stairs-turn", "16 cm up, half a turn, down", _UP, 0.3, 3.4, returns=True, bar=0.9),
+    Way("depth-stairs-16", "16 cm by depth camera", _stairs(0.16), 0.3, sees="depth", bar=0.9),
     Way("seen-blocks", "4 blocks of 20 cm, 0.5 m/s", _at(Blocks(0.20))),
     Way("seen-slope", "ramp of 22 deg up and down, 0.5 m/s", _SLOPE),
     Way("seen-gap-20", "gap of 20 cm, 0.5 m/s", _at(Gap(0.20))),
     Way("seen-gap-30", "30 cm", _at(Gap(0.30)), bar=0.6),
-    Way("seen-stones", "stones of 25 cm, 10 cm between, 0.5 m/s", _at(Stones()), bar=0.8),
+    Way("seen-stones", "stones of 25 cm, 10 cm between, 0.3 m/s", _at(Stones()), 0.3, bar=0.8),
     Way("seen-waves", "5 waves of 8 cm, 0.5 m/s", _at(Waves(0.08)), bar=1.0),
     Way("seen-boxes", "boxes up to 12 cm, 0.5 m/s", _boxes, length=3.5, bar=1.0),
     Way("seen-course", "random course of 12 m, 0.5 m/s", Course.drawn, bar=0.9),
 )
-SEEING = tuple(replace(way, sees=True) for way in SEEING)
+SEEING = tuple(replace(way, sees=way.sees or "lidar") for way in SEEING)
 BARRIERS = (
     Way("seen-wall", "wall", _at(Blocks(0.6, count=1, start=2.0))),
     Way("seen-gap-60", "gap of 60 cm", _at(Gap(0.6, start=2.0))),
     Way("seen-step-30", "step of 30 cm", _at(Stairs(0.3, count=1, start=2.0))),
 )
-BARRIERS = tuple(replace(way, sees=True) for way in BARRIERS)
+BARRIERS = tuple(replace(way, sees="lidar") for way in BARRIERS)
 CASES = (
     Reversals("flat", "reversals"),
     Reversals("flat-late", "the same, 0 to 18 ms late", latest=LATEST),

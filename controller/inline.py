@@ -8,22 +8,22 @@ from __future__ import annotations
 
 import base64
 import html
-import io
 
 from controller.report_view import planned, verdict_of
+from controller.seen_terrain import SeenTerrain
 from controller.sweeps.run import SweepResult
 from controller.sweeps.summary import summarise
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.recording import Recording
 from motions import CheckedMotion, CompiledPlan, FeasibilityChecker, FeasibilityReport, Timeline
 from viz.content import ReplayContent
+from viz.render.ground import ground_figure
 from viz.render.margin_plot import margin_figure
 from viz.replay.html_page import replay_html
+from viz.style import png_of
 
 HEIGHT = 620
 """Of a page [px]."""
-SHARPNESS = 120
-"""Of a plot [dots per inch]."""
 LONGEST = 60.0
 """Motions and recordings that last longer [s] are not drawn unasked: the page would be large."""
 
@@ -37,6 +37,8 @@ def html_of(value: object) -> str | None:
             return _table(value)
         if isinstance(value, Recording):
             return _page(ReplayContent(value), "recording", value.duration)
+        if isinstance(value, SeenTerrain):
+            return _picture(png_of(ground_figure(value.points(), repr(value))))
         if isinstance(value, Timeline | CompiledPlan):
             value = FeasibilityChecker().evaluate(value)
         if isinstance(value, CheckedMotion):
@@ -56,12 +58,16 @@ def _page(content: ReplayContent, title: str, duration: float) -> str | None:
 
 
 def _report(report: FeasibilityReport) -> str:
-    table, verdict, drawing = html.escape(report.table()), verdict_of(report), io.BytesIO()
+    table, verdict = html.escape(report.table()), verdict_of(report)
     if not verdict.curves:
         return f"<pre>{table}</pre>"
-    margin_figure(verdict, title=report.motion).savefig(drawing, format="png", dpi=SHARPNESS)
-    picture = base64.b64encode(drawing.getvalue()).decode()
-    return f'<pre>{table}</pre><img style="max-width:100%" src="data:image/png;base64,{picture}">'
+    figure = margin_figure(verdict, title=report.motion)
+    return f"<pre>{table}</pre>{_picture(png_of(figure))}"
+
+
+def _picture(png: bytes) -> str:
+    picture = base64.b64encode(png).decode()
+    return f'<img style="max-width:100%" src="data:image/png;base64,{picture}">'
 
 
 def _table(result: SweepResult) -> str:

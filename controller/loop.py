@@ -215,6 +215,7 @@ class ControlLoop:
             taken = min(past, key=lambda state: abs(state.time - scan.time))
             place = taken.p_world_base, taken.R_world_base
             fuse(self.heights, scan.p_base_points, *place, scan.deviation)
+            self.telemetry.see(self.heights, place[0])
         feel(self.heights, self.snapshot, self.state.feet_in_contact, self.plant.control_period)
 
     def _look_after_parts(self) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.arguments import typed
+from go2_wbc.brief import inline_html
 from go2_wbc.errors import CommandError
 from go2_wbc.planning.height_map import CELL, HeightMap, cells, heights_at
 
@@ -19,6 +20,8 @@ class SeenTerrain:
     Attributes:
         blocked: what the robot has stopped in front of, in plain words; "" if its way is free.
     """
+
+    _repr_html_ = inline_html
 
     def __init__(self, heights: HeightMap, blocked: str) -> None:
         """Look at ``heights``, which change as the robot walks on."""

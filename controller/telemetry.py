@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,8 +11,9 @@ from jaxtyping import Bool, Float, Int
 
 from go2_wbc.errors import CommandError
 from go2_wbc.geometry import moving_support_margins
+from go2_wbc.planning.height_map import CELL, HeightMap, cells
 from go2_wbc.recording import Recording
-from go2_wbc.records import Record, layout_of, packed
+from go2_wbc.records import Array3, ArrayNx3, Record, layout_of, packed
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import note_peaks
 from go2_wbc.robot.payload import NO_PAYLOAD
@@ -21,6 +23,9 @@ from go2_wbc.validation import LARGEST, is_finite_number
 BLOCK = 4096
 """Ticks whose memory is asked for at once, 2.4 MB: numpy wants huge pages for 4 MB and more, and
 the first touch of one of these cost 5.6 ms of a tick (seen on a virtual machine)."""
+KEPT_WAY, KEPT_MAPS = 1.0, 60
+"""Way [m] after which the map of the ground is kept, before it is overwritten, and of how many such
+ways."""
 
 
 class Tick(Record):
@@ -61,6 +66,8 @@ class Telemetry:
         self._count = 0
         self._motor, self._peaks = packed(model.motor), np.zeros((3, 12))
         self._v_before: Float[np.ndarray, "12"] | None = None
+        self._heights, self._kept_at = HeightMap(), np.full(3, np.inf)
+        self._grounds: deque[ArrayNx3] = deque(maxlen=KEPT_MAPS)
         self.payload = NO_PAYLOAD
         self.qp_failures = self.relaxed_ticks = self.grave_ticks = self.missed_deadlines = 0
 
@@ -84,6 +91,13 @@ class Telemetry:
         before = v if self._v_before is None else self._v_before
         note_peaks(state.tau, v, before, self._motor, self._peaks)
         self._v_before = v
+
+    def see(self, heights: HeightMap, p_world_base: Array3) -> None:
+        """Note what the ground is like around the robot."""
+        self._heights = heights
+        if not math.dist(p_world_base, self._kept_at) < KEPT_WAY:
+            self._grounds.append(cells(heights))
+            self._kept_at = p_world_base
 
     @property
     def peak_torque_ratio(self) -> float:
@@ -134,7 +148,8 @@ class Telemetry:
             labels=labels,
             robot=self._model.description.profile.name,
         )
-        return Samples(recording, taken[:, _FEET].reshape(-1, 4, 3))
+        grounds = (cells(self._heights), *reversed(self._grounds))
+        return Samples(recording, taken[:, _FEET].reshape(-1, 4, 3), grounds)
 
     def _taken(self, rows: Int[np.ndarray, " n"], columns: slice) -> Float[np.ndarray, "n k"]:
         """A copy of some columns of these rows."""
@@ -152,10 +167,12 @@ class Samples:
     Attributes:
         unfinished: the recording, its support margins nan.
         p_world_feet: (n, 4, 3) foot centres [m].
+        grounds: cells of ground that were seen, the newest map first.
     """
 
     unfinished: Recording
     p_world_feet: Float[np.ndarray, "n 4 3"]
+    grounds: tuple[Float[np.ndarray, "_ 3"], ...]
 
     def recording(self) -> Recording:
         """The finished recording."""
@@ -165,4 +182,6 @@ class Samples:
             rows = (stance == feet).all(axis=1)
             p_feet = self.p_world_feet[rows][:, feet, :2]
             margins[rows] = moving_support_margins(p_feet, p_com[rows])
-        return replace(self.unfinished, support_margin=margins)
+        ground = np.concatenate(self.grounds)
+        _, newest = np.unique(np.floor(ground[:, :2] / CELL), axis=0, return_index=True)
+        return replace(self.unfinished, support_margin=margins, ground=ground[newest])

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import io
 import zipfile
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from importlib.metadata import entry_points
 from itertools import groupby, pairwise
 from pathlib import Path
@@ -62,6 +63,8 @@ class Recording:
         labels: what the robot was doing at each sample ("stand", "walk", ...), length n.
         robot: name of the robot's profile.
         model_file: its own MJCF or URDF, by which it is drawn; empty if it has none.
+        ground: (k, 3) middles of the cells of ground that it has seen, each as it was found last
+            [m]; none of a blind robot.
     """
 
     time: Float[np.ndarray, " n"]
@@ -75,6 +78,7 @@ class Recording:
     labels: tuple[str, ...]
     robot: str = "go2"
     model_file: str = ""
+    ground: Float[np.ndarray, "k 3"] = field(default_factory=partial(np.empty, (0, 3)))
 
     _repr_html_ = inline_html
 
@@ -125,6 +129,7 @@ class Recording:
                 values |= {
                     name: str(file[name]) for name in ("robot", "model_file") if name in file
                 }
+                values |= {"ground": file["ground"]} if "ground" in file else {}
                 labels = tuple(file["labels"].tolist())
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
             raise ConfigError(f"{path} is missing, damaged, or no recording of save()") from error

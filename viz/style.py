@@ -43,6 +43,13 @@ def rgb(color: str) -> tuple[float, float, float]:
     return red / 255, green / 255, blue / 255
 
 
+def png_of(figure: Figure) -> bytes:
+    """A figure as a picture of 120 dots per inch."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=120)
+    return stream.getvalue()
+
+
 def save_figure(figure: Figure, target: Path) -> Path:
     """Write a figure; ``target`` is checked already, and its ending says the kind.
 

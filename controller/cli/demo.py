@@ -38,10 +38,12 @@ if TYPE_CHECKING:
 
 
 BACKENDS = ("condensed", "full", "placo")
+TERRAINS = ("stairs", "course")
 SOLVERS = ("active_set", "daqp", "proxqp", "quadprog")
 START_NOISE = 0.05
 """Standard deviation [rad] of the joint angles from which the robot starts with ``--seed``."""
 TITLE = "Go2: stand, sit, walk, turn, high five"
+SEEING = "Go2: {} by sight"
 FILES: Mapping[str, str] = {
     "demo.npz": "recording (NumPy)",
     "report.json": "report",
@@ -74,6 +76,9 @@ class Robot:
     friction: Annotated[float | None, "MU", "of the feet, default 0.8", _positive] = None
     mass_scale: Annotated[float, "X", "factor on all masses", _positive] = 1.0
     mjcf: Mjcf = None
+    terrain: Annotated[
+        str | None, TERRAINS, "walk over it instead, on the robot's own sensors and a lidar"
+    ] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,8 +107,8 @@ def run(
 ) -> int:
     """Stand, sit, walk, turn, high five and sit in MuJoCo; then print what was measured.
 
-    It leaves an offline 3D replay and pictures. Exit code 0 if every step was done, 1 if one was
-    not, 3 if something broke.
+    With --terrain it walks over that instead, by sight. It leaves an offline 3D replay and
+    pictures. Exit code 0 if every step was done, 1 if one was not, 3 if something broke.
 
     Examples:
         go2-wbc demo                         headless; table, replay page, animation
@@ -111,6 +116,7 @@ def run(
         go2-wbc demo --viewer --realtime     watch it live in MuJoCo's window
         go2-wbc demo --friction 0.4 --mass-scale 1.2 --seed 3
         go2-wbc demo --backend placo --solver proxqp
+        go2-wbc demo --terrain course        stairs, a block, stones and a gap, by sight
         go2-wbc demo --ros2                  on the robot of `go2-wbc ros2 --realtime`
     """
     if elsewhere.namespace != Elsewhere().namespace and not elsewhere.ros2:
@@ -129,7 +135,8 @@ def run(
     try:
         _write_data(recording, values, paths)
         if not output.no_media:
-            _write_media(recording, report, paths)
+            title = TITLE if robot.terrain is None else SEEING.format(robot.terrain)
+            _write_media(recording, report, paths, title)
     except ConfigError as error:  # the disk or the size: no fault of the caller's usage
         print(f"go2-wbc: {error}", file=sys.stderr)
         return ExitCode.RUNTIME
@@ -176,7 +183,9 @@ def checked_paths(folder: Path) -> list[Path]:
 
 def _perform(output: Output, robot: Robot, control: Control) -> tuple[DemoReport, Recording]:
     from controller.demo.run import run_demo
+    from controller.demo.steps import DEMO_STEPS, TERRAINS, terrain_steps
 
+    steps = DEMO_STEPS if robot.terrain is None else terrain_steps(TERRAINS[robot.terrain])
     with ProgressLine() as line:
 
         def show(progress: DemoProgress) -> None:
@@ -188,15 +197,17 @@ def _perform(output: Output, robot: Robot, control: Control) -> tuple[DemoReport
 
         line.update(0.0, "loading the robot")
         with _controller(output, robot, control) as go2:
-            report = run_demo(go2, show)
+            report = run_demo(go2, show, steps)
             return report, go2.recording()
 
 
 def _controller(output: Output, robot: Robot, control: Control) -> GO2Controller:
+    from controller.demo.steps import TERRAINS
     from controller.go2_controller import GO2Controller
     from go2_wbc.config import Config, load_config
     from go2_wbc.plant import MujocoPlant
 
+    sees = robot.terrain is not None
     config = Config() if control.config is None else load_config(control.config)
     if control.backend is not None:
         config = replace(config, backend=control.backend)
@@ -211,6 +222,9 @@ def _controller(output: Output, robot: Robot, control: Control) -> GO2Controller
         seed=robot.seed or 0,
         initial_joint_noise=0.0 if robot.seed is None else START_NOISE,
         motor=config.motor,
+        terrain=TERRAINS[robot.terrain] if robot.terrain else None,
+        lidar=sees,
+        sensors="imu" if sees else "ideal",
         visuals=viewer,
     )
     return GO2Controller(plant=plant, realtime=output.realtime, viewer=viewer, config=config)
@@ -232,12 +246,12 @@ def _write_data(recording: Recording, values: Mapping[str, object], paths: list[
     write_atomically(paths[1], (json.dumps(values, indent=2) + "\n").encode())
 
 
-def _write_media(recording: Recording, report: DemoReport, paths: list[Path]) -> None:
+def _write_media(recording: Recording, report: DemoReport, paths: list[Path], title: str) -> None:
     """Page, filmstrip and animation; the animation takes by far the longest."""
     _, _, page, filmstrip, animation = paths
     with ProgressLine() as line:
         line.update(0.0, f"drawing {page.name}")
-        viz.export_html(recording, page, title=TITLE)
+        viz.export_html(recording, page, title=title)
         line.update(0.1, f"drawing {filmstrip.name}")
         viz.export_filmstrip(recording, filmstrip, times=filmstrip_times(report, recording))
         viz.export_animation(
@@ -250,9 +264,13 @@ def _write_media(recording: Recording, report: DemoReport, paths: list[Path]) ->
 def filmstrip_times(report: DemoReport, recording: Recording) -> list[float] | None:
     """Seconds after the start at which the robot sits, swings two legs, and holds its paw up.
 
-    None if the run has no such moments; the filmstrip then chooses for itself.
+    Of a walk over a terrain, three moments of it. None if the run has no such moments; the
+    filmstrip then chooses for itself.
     """
     steps = {step.name: step for step in report.steps}
+    if (cross := steps.get("cross")) is not None:
+        start = cross.start - float(recording.time[0])
+        return [start + share * cross.duration for share in (0.25, 0.5, 0.75)]
     if not {"sit", "forward", "high_five"} <= steps.keys():
         return None
 

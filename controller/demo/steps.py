@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -12,6 +12,7 @@ from jaxtyping import Float
 from controller.go2_controller import GO2Controller
 from controller.modes import ANGLE_TOLERANCE, HEIGHT_TOLERANCE, STILL_SPEED, Outcome
 from controller.navigation import HEADING_TOLERANCE
+from go2_wbc.plant.terrain import BOTH, Blocks, Course, Gap, Stairs, Stones, Terrain
 from go2_wbc.recording import Recording
 from go2_wbc.robot.profile import find_profile
 
@@ -154,6 +155,8 @@ STOP_TIME = 1.0
 """Time [s] that the robot gets to come to rest."""
 TURN_ANGLE = math.pi / 2
 """Angle [rad] of the turn, to the left."""
+WAY_TOLERANCE = 0.1
+"""Accepted error [m] of the way over a terrain, by the robot's own estimate."""
 HOLD_TIME = 2.0
 """Time [s] for which the paw is held up."""
 
@@ -283,3 +286,37 @@ DEMO_STEPS: tuple[DemoStep, ...] = (
     DemoStep("sit_again", "sit", lambda go2: go2.sit(), _sitting),
 )
 """Stand, sit, walk, forward, stop, turn, high five, sit."""
+
+TERRAINS: Mapping[str, Terrain] = {
+    "stairs": Stairs(0.16, 4, 0.31, way=BOTH, landing=1.2),
+    "course": Course(
+        (
+            Stairs(0.15, 3, 0.31, way=BOTH, landing=1.0),
+            Blocks(0.18, count=1),
+            Stones(),
+            Gap(0.2),
+        )
+    ),
+}
+"""What a robot that sees can be shown on, by name."""
+BEHIND = 0.6
+"""How far [m] behind the end of a terrain its way ends."""
+
+
+def terrain_steps(terrain: Terrain) -> tuple[DemoStep, ...]:
+    """Stand, walk over a terrain that has an end, and stand."""
+    way = terrain.end + BEHIND
+
+    def crossed(run: StepRun) -> tuple[Measurement, ...]:
+        ahead, aside = displacement(run.recording)
+        climbed = float(np.ptp(run.recording.q[:, 2]))
+        return (
+            Measurement("way ahead", float(ahead), "m", way, WAY_TOLERANCE),
+            Measurement("way aside", float(aside), "m", 0.0),
+            Measurement("up and down", climbed, "m"),
+        )
+
+    label = f"walk {way:.1f} m by sight"
+    cross = DemoStep("cross", label, lambda go2: go2.move_forward(way), crossed)
+    stand, _, walk = DEMO_STEPS[:3]
+    return stand, walk, cross, replace(stand, name="stand_again")

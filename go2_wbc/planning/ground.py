@@ -76,7 +76,10 @@ STEEP, STEEP_FORGETS = 0.15, 7.0
 steep: on stairs every other foot tells it anew, but on a ramp of 22 deg it is only its beginning,
 and 3 of 10 robots fell behind it that still walked as on stairs."""
 FIRST_WAY = 0.5
-"""For how far [m] the first step is taken for a high one."""
+"""For how far [m] the first step is taken for a high one, and after one up the next is expected."""
+LIFT_RATE, LEAN_RATE, LEAN_SPEED = 0.3, 1.0, 0.1
+"""Greatest rate [m/s] at which the trunk is lifted for it, and [1/s] at which its leading end is,
+and speed [m/s] from which on the latter is in full. These are from a search in simulation."""
 HASTE_FRICTION = 0.45
 """Friction from which on the ground bears the greatest acceleration; on less it falls with the
 square: what slid once shows less than there is, and goes on at once on ground that has it."""
@@ -97,10 +100,6 @@ CALMING = 0.8
 """Share of the roughness that is left after a landing."""
 STUMBLE = 0.06
 """Roughness [m] that a foot tells which is stopped in the middle of its swing."""
-LOWERED, LIFT, LIFT_RATE = 0.15, 0.045, 0.1
-"""Fall of the way, per metre, from which on it leads down; by how much [m] the trunk is carried
-higher on it if it is uneven, so that its calves pass the edges, and how fast [m/s] it comes there:
-down 6 stairs of 14 cm at 0.8 m/s, blind, came 28 of 30 with it and 16 of 20 without."""
 DELAY = 0.4
 """Share of a swing, on the roughest ground, in which the foot only rises. At a step of 10 cm, feet
 that stood close to it rubbed along its face and stood on its edge: 4 of 40 runs fell, none with
@@ -144,6 +143,12 @@ class RoughConfig:
             does not tell how high it is, and the next one must not meet it as well.
         swing: time [s] by which it is longer.
         stance: longest time [s] that a foot stands, if that is not shorter already.
+        first_lift: height [m] by which the trunk is carried higher while a first step is expected.
+        first_lean: slope by which its leading end is raised then. With the trunk as on smooth
+            ground, its nose met the face of the second of those stairs before it had risen, and the
+            robot was thrown back: past the first two came 11 of 20, with the lift 18, with the lean
+            17, with both 20 (seeds 6000 to 6019). Carried on to where the ground falls away, they
+            kept the feet from reaching it: up and down came 16 with both, 19 as it is, 14 without.
         leash: greatest distance [m] of the height that is asked of the CoM from that it has. A foot
             that meets a step makes the wanted height jump: 9 cm at once threw the robot into the
             air, from where it fell.
@@ -161,6 +166,8 @@ class RoughConfig:
     way: float = 1.7
     raised: float = 0.05
     first_raised: float = 0.08
+    first_lift: float = 0.04
+    first_lean: float = 0.12
     swing: float = 0.02
     stance: float = 0.16
     leash: float = 0.04
@@ -179,7 +186,9 @@ class Ground(Record):
         rough_way: for how far [m] it is taken for rough yet.
         high_way: for how far [m] steps are taken for high yet.
         steeper: share of the slope by which the trunk follows it more.
-        lift: height [m] by which the trunk is carried higher.
+        rise_way: for how far [m] steps up are expected yet.
+        lift: height [m] by which the trunk is carried higher for these.
+        lean: slope that the trunk follows besides, to raise its leading end.
     """
 
     height: float
@@ -190,7 +199,9 @@ class Ground(Record):
     rough_way: float
     high_way: float
     steeper: float
+    rise_way: float
     lift: float
+    lean: Float[np.ndarray, "2"]
 
 
 def ground_below(now: Snapshot, foot_radius: float) -> Ground:
@@ -254,12 +265,17 @@ def raised(g: Ground) -> float:
 
 
 @subroutine
+def levelness(g: Ground) -> float:
+    """1 on the level, 0 on stairs as far as they are known."""
+    return max(1.0 - np.hypot(g.slope[0], g.slope[1]) / STEEP, 0.0)
+
+
+@subroutine
 def apex_raise(g: Ground, c: RoughConfig) -> float:
     """Height [m] by which a swing is higher than on smooth ground."""
     if not is_rough(g):
         return raised(g)
-    level = max(1.0 - np.hypot(g.slope[0], g.slope[1]) / STEEP, 0.0)
-    return max(raised(g), c.raised + level * (c.first_raised - c.raised))
+    return max(raised(g), c.raised + levelness(g) * (c.first_raised - c.raised))
 
 
 @subroutine
@@ -272,7 +288,7 @@ def delay(g: Ground) -> float:
 def tilt(g: Ground) -> tuple[float, float]:
     """Slope that the trunk follows."""
     follow = FOLLOW + g.steeper
-    return follow * g.slope[0], follow * g.slope[1]
+    return follow * g.slope[0] + g.lean[0], follow * g.slope[1] + g.lean[1]
 
 
 @subroutine
@@ -323,12 +339,19 @@ def carry_ground(g: Ground, c: RoughConfig, now: Snapshot, dt: float) -> None:
 
 
 @subroutine
-def carry_higher(g: Ground, velocity: tuple[float, float], is_uneven: bool, dt: float) -> None:
-    """Bring the trunk higher, or back, after ``dt`` seconds of a wanted ``velocity`` [m/s]."""
-    x, y = velocity
-    leads_down = g.slope[0] * x + g.slope[1] * y < -LOWERED * np.hypot(x, y)
-    lift = LIFT if is_uneven and leads_down else 0.0
-    g.lift += min(max(lift - g.lift, -LIFT_RATE * dt), LIFT_RATE * dt)
+def expect_steps(
+    g: Ground, c: RoughConfig, now: Snapshot, ahead: tuple[float, float], dt: float
+) -> None:
+    """Carry the trunk for a step up that may follow, on its way ``ahead`` [m/s]."""
+    speed = np.hypot(ahead[0], ahead[1])
+    g.rise_way -= min(np.hypot(now.v_world_com[0], now.v_world_com[1]) * dt, g.rise_way)
+    share = levelness(g) if is_rough(g) and g.rise_way > 0.0 else 0.0
+    most = LIFT_RATE * dt
+    g.lift += min(max(share * c.first_lift - g.lift, -most), most)
+    most = LEAN_RATE * dt
+    for i in range(2):
+        lean = share * c.first_lean * ahead[i] / max(speed, LEAN_SPEED)
+        g.lean[i] += min(max(lean - g.lean[i], -most), most)
 
 
 @subroutine
@@ -374,6 +397,8 @@ def learn_ground(
             count += 1
             mean += off
             most = max(most, abs(off))
+            if abs(off) > ROUGH:
+                g.rise_way = FIRST_WAY if off > 0.0 else 0.0
             for i in range(3):
                 g.p_met[leg, i] = p[i]
             g.p_met[leg, 2] -= gone
@@ -390,7 +415,7 @@ def learn_ground(
 @subroutine
 def note_stumble(g: Ground) -> None:
     """Take in that a foot was stopped in its swing."""
-    g.roughness = max(g.roughness, STUMBLE)
+    g.roughness, g.rise_way = max(g.roughness, STUMBLE), FIRST_WAY
 
 
 class Slip(Record):

@@ -30,7 +30,7 @@ from go2_wbc.planning.ground import (
     MOST_FRICTION,
     Slip,
     carry_ground,
-    carry_higher,
+    expect_steps,
     greatest_speed,
     ground_at,
     ground_below,
@@ -90,6 +90,7 @@ from go2_wbc.planning.walk import (
     Planner,
     Rest,
     Walk,
+    carried_height,
 )
 from go2_wbc.records import packed
 from go2_wbc.reference import STANCE, SWING, Reference, Target
@@ -144,9 +145,10 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
     else:
         rest_in_place(now, s, config.position_leash, dt)
     carry_ground(s.ground, config.rough, now, dt)
-    is_uneven = s.sight.uneven_way > 0.0 if s.sight.sees else is_rough(s.ground)
-    carry_higher(s.ground, world_velocity(trunk), is_uneven, dt)
-    correct_height(trunk, now, s.ground.height + (c.height + s.ground.lift), dt)
+    if s.sight.sees:
+        s.ground.rise_way = 0.0
+    expect_steps(s.ground, config.rough, now, world_velocity(trunk), dt)
+    correct_height(trunk, now, s.ground.height + carried_height(s, c), dt)
 
 
 @subroutine
@@ -268,7 +270,7 @@ def plan(
     observe_slip(s.slip, now, contact, tau, stands, steps, beside, dt)
     note_liftoffs(now, s, c, contact, stance, progress)
     target.friction = level_friction(s.ground, s.slip.friction, LEAST_FRICTION)
-    fill_body(s.trunk, s.ground, c.height + s.ground.lift, target)
+    fill_body(s.trunk, s.ground, carried_height(s, c), target)
     target.p_world[2] = on_leash(s.ground, c.config.rough, target.p_world[2], now)
     level(s.trunk, now, contact, s.is_stepping, dt, target)
     fill_feet(now, s, c, stance, stands, elapsed, remaining, target, m, dt)

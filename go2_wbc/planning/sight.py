@@ -47,11 +47,17 @@ SPEED, FLIGHT_SPEED = 0.43, 0.32
 """Greatest speed [m/s] on it, and on a flight of stairs: of"""
 FLIGHT, FLIGHT_STEP = 3, 0.13
 """so many steps in sight, and higher than that [m]."""
+LOWERED, LIFT, LIFT_RATE = 0.15, 0.045, 0.1
+"""Fall of the way, per metre, from which on it leads down; by how much [m] the trunk is higher on
+it, and how fast [m/s] it comes there."""
+HIGH_STEP, MORE_LIFT = 0.19, 0.02
+"""Height [m] of a step above which the trunk is higher, going down, by as much more, and the most
+[m]: calves pass over 20 cm; for 18 cm the legs stand better a little bent."""
 GREATEST_STEP, GREATEST_GAP = 0.24, 0.38
 """Height [m] of a step and length [m] of a hole that the robot does not try."""
 EVEN, FOOT_CELLS = 0.04, 3
 """Cells in a row that a foot needs, and the height [m] by which two of them may differ."""
-FAR, LINE, MOVED_ASIDE = 1.15, 0.15, 0.075
+FAR, LINE, MOVED_ASIDE = 1.15, 0.15, 0.1
 """How far ahead [m] its way is looked along, how far aside [m] the feet go, and how far from there
 they can be put."""
 STOP, BRAKING = 0.60, 0.5
@@ -71,6 +77,7 @@ class Sight(Record):
     Attributes:
         sees: whether the ground below the trunk is known.
         uneven_way: for how far [m] the ground is taken for uneven yet.
+        lift: height [m] by which the trunk is carried higher.
         blocked: what ends the way ahead, 0 for nothing.
         end: how far ahead [m] of the CoM that is.
         stopped: for how long [s] it has been so near that the robot has stopped.
@@ -79,6 +86,7 @@ class Sight(Record):
 
     sees: bool
     uneven_way: float
+    lift: float
     blocked: float
     end: float
     stopped: float
@@ -203,7 +211,7 @@ def way_ahead(m: HeightMap, x: float, y: float, way: V3, here: float) -> tuple[f
                 break
             for side in (-MOVED_ASIDE, MOVED_ASIDE):
                 other = beside(m, x, y, way, (ahead, line * LINE + side))
-                if not abs(z - last) < abs(other - last):
+                if np.isnan(z) or abs(other - last) < abs(z - last):
                     z = other
             if np.isnan(z):
                 continue
@@ -252,6 +260,9 @@ def look(
     g.roughness, g.rough_way, g.high_way = mean, 0.0, 0.0
     climb = g.slope[0] * way[0] + g.slope[1] * way[1]
     g.steeper = 1.0 - FOLLOW if climb > 0.0 else 0.0
+    more = min(max(highest - HIGH_STEP, 0.0), MORE_LIFT)
+    lift = LIFT + more if climb < -LOWERED and sight.uneven_way > 0.0 else 0.0
+    sight.lift += min(max(lift - sight.lift, -LIFT_RATE * dt), LIFT_RATE * dt)
     sight.blocked, sight.end = way_ahead(m, x, y, way, plane[0])
     is_near = sight.blocked != 0.0 and sight.end < STOP + NEAR_STOP
     sight.stopped = sight.stopped + dt if is_near else 0.0

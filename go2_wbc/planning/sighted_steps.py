@@ -8,15 +8,18 @@ distance d, that costs least:
         comes below CLEARANCE over the ground, and the hip out of reach
 
 ``way`` is that from where the foot is led at present: what the trunk's velocity does within a
-stride must not send it to and fro. ``edge`` falls, as a square, from 1 at ``NEAR`` to 0 at
+stride must not send it to and fro. ``edge`` falls, as a square, through 1 at ``NEAR`` to 0 at
 ``NEAR_ENOUGH`` from the next cell that is lower by more than ``STEP``, or unknown, or a little
 nearer if it is higher; ``range`` is that of the heights of the cells around it. It is chosen anew
-until ``LATEST`` of the swing, and gone over to at ``SLEW``; later only its height follows.
+until ``LATEST`` of the swing, and gone over to at ``SLEW``; later only its height follows. The
+place that was chosen last may always be kept: the blind one swings aside with the trunk by 8 cm,
+and would drag it over an edge.
 
 The swing goes up to a top over both of its ends and all that is between, and down; each part's time
 is by its height. It goes ahead between two moments, which are the nearest to the swing's begin and
-end between which it keeps ``OVER`` from what it passes. So the foot rises in front of a step, and
-goes ahead over the edge behind it before it comes down; on the level it goes ahead all the time.
+to ``LANDED``, from which on the foot may touch, between which it keeps ``OVER`` from what it
+passes. So the foot rises in front of a step, and goes ahead over the edge behind it before it comes
+down; on the level it goes ahead all the time.
 """
 
 from __future__ import annotations
@@ -33,7 +36,7 @@ from go2_wbc.planning.walk import Planner, Walk
 from go2_wbc.records import V3, Array3
 from go2_wbc.robot.state import Snapshot
 
-ALONG, ACROSS = 7, 3
+ALONG, ACROSS = 7, 4
 """Cells by which a foothold may be moved ahead and aside, either way."""
 FAR, FLAT, MISS = 0.06, 0.02, 150.0
 """Distance [m] and range of heights [m] that cost 1, and what a metre of missing room costs."""
@@ -52,9 +55,9 @@ that was sent to the other side of a gap in the middle of its swing came down in
 LEAST_TOP, OVER_WAY, OVER = 0.06, 0.05, 0.02
 """Height [m] of a swing's top over its ends, over the ground between them, and of every other point
 over what it passes."""
-SHAPED, WAITS, WAIT = 0.1, 6, 0.06
-"""Share of the swing until which its shape is sought, and the moments tried: how many, and how far
-apart."""
+SHAPED, WAITS, WAIT, LANDED = 0.1, 6, 0.06, 0.9
+"""Share of the swing until which its shape is sought, the moments tried, how many and how far
+apart, and the last of them."""
 LANDS = 0.03
 """Distance [m] from the map within which a contact late in the swing may be a landing."""
 
@@ -75,7 +78,7 @@ def edge_cost(m: HeightMap, x: float, y: float, z: float) -> tuple[float, float]
                 nearest = far
             elif abs(i) <= 1 and abs(j) <= 1:
                 low, high = min(low, beside), max(high, beside)
-    near = min((NEAR_ENOUGH - nearest) / (NEAR_ENOUGH - NEAR), 1.0)
+    near = (NEAR_ENOUGH - nearest) / (NEAR_ENOUGH - NEAR)
     return near * near, high - low
 
 
@@ -134,31 +137,31 @@ def choose(
             hip[i] += now.R_world_base[i, k] * c.p_base_hips[leg, k]
     way = (stance * v_x, stance * v_y, stance * climb)
     at = plus_scaled(triple(hip), spans[1] / stance, way)
-    best = np.inf
-    for i in range(-ALONG, ALONG + 1):
-        for j in range(-ACROSS, ACROSS + 1):
-            cost = CELL * CELL * (i * i + j * j) / FAR**2
-            if cost >= best:
-                continue
-            x = blind[0] + CELL * (cosine * i - sine * j)
-            y = blind[1] + CELL * (sine * i + cosine * j)
-            moved = np.hypot(x - step.goal[0], y - step.goal[1])
-            if moved > most:
-                continue
-            if most < np.inf:
-                cost += STICKY * (moved / FAR) ** 2
-            z = height_at(m, x, y)
-            if np.isnan(z):
-                cost, z = cost + UNKNOWN, blind[2] - c.foot_radius
-            near, spread = edge_cost(m, x, y, z)
-            cost += EDGE * near + (spread / FLAT) ** 2
-            if cost >= best:
-                continue
-            cost += MISS * leg_miss(m, at, way, (x, y, z + c.foot_radius), c)
-            if cost < best:
-                best = cost
-                step.chosen[0], step.chosen[1] = x, y
-                step.chosen[2] = z + c.foot_radius
+    best, kept = np.inf, triple(step.chosen)
+    for n in range(-1, (2 * ALONG + 1) * (2 * ACROSS + 1)):
+        i, j = n // (2 * ACROSS + 1) - ALONG, n % (2 * ACROSS + 1) - ACROSS
+        x = blind[0] + CELL * (cosine * i - sine * j)
+        y = blind[1] + CELL * (sine * i + cosine * j)
+        if n < 0:
+            x, y, _ = kept
+        cost = ((x - blind[0]) ** 2 + (y - blind[1]) ** 2) / FAR**2
+        moved = np.hypot(x - step.goal[0], y - step.goal[1])
+        if cost >= best or moved > most:
+            continue
+        if most < np.inf:
+            cost += STICKY * (moved / FAR) ** 2
+        z = height_at(m, x, y)
+        if np.isnan(z):
+            cost, z = cost + UNKNOWN, blind[2] - c.foot_radius
+        near, spread = edge_cost(m, x, y, z)
+        cost += EDGE * near + (spread / FLAT) ** 2
+        if cost >= best:
+            continue
+        cost += MISS * leg_miss(m, at, way, (x, y, z + c.foot_radius), c)
+        if cost < best:
+            best = cost
+            step.chosen[0], step.chosen[1] = x, y
+            step.chosen[2] = z + c.foot_radius
 
 
 @subroutine
@@ -207,8 +210,8 @@ def shape(leg: int, s: Planner, c: Walk, m: HeightMap) -> None:
     best = np.inf
     for wait in range(WAITS + 1):
         for early in range(WAITS + 1):
-            begin, end = wait * WAIT, 1.0 - early * WAIT
-            cost = 0.2 * (begin + 1.0 - end)
+            begin, end = wait * WAIT, LANDED - early * WAIT
+            cost = 0.2 * (begin + LANDED - end)
             if cost >= best:
                 continue
             for n in range(1, 12):

@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
+from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ConfigError
 from go2_wbc.planning import ground, swing
@@ -236,3 +237,9 @@ class Planner(Record):
     planned: PlannedForces
     horizon: Horizon
     sight: Sight
+
+
+@subroutine
+def carried_height(s: Planner, c: Walk) -> float:
+    """Height [m] of the CoM above the ground at which it is carried."""
+    return c.height + s.sight.lift + s.ground.lift

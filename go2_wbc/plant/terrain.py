@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -19,82 +18,12 @@ from jaxtyping import Float
 from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.errors import ConfigError, unknown_name
+from go2_wbc.plant.blocks import HALF_WIDTH, PLATFORM, Block, Terrain
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Rule, ranged
 
 STEEPEST = 0.8
 """Greatest angle [rad] of a slope: steeper than any friction coefficient up to 1 holds."""
-HALF_WIDTH = 5.0
-"""Half width [m] of stairs, ramps and patches."""
 CLIMBED = Rule(f"above 0, at most {STEEPEST} rad", lambda angle: 0.0 < angle <= STEEPEST)
-PLATFORM = 10.0
-"""Length [m] of the level ground behind the last step."""
-
-
-@dataclass(frozen=True, slots=True)
-class Block:
-    """A box that is fixed to the world.
-
-    Attributes:
-        centre: of the box [m].
-        half_size: half of its sides [m].
-        yaw: by which it is turned about z [rad].
-        pitch: by which it is turned about its own y axis before [rad]; positive lowers its +x end.
-        friction: sliding friction coefficient on it, in the place of the plant's; None for that.
-    """
-
-    centre: tuple[float, float, float]
-    half_size: tuple[float, float, float]
-    yaw: float = 0.0
-    pitch: float = 0.0
-    friction: float | None = None
-
-    @staticmethod
-    def slab(start: float, length: float, bottom: float, top: float) -> Block:
-        """A level one across the way: where it begins and how long it is [m], and its heights."""
-        centre = (start + 0.5 * length, 0.0, 0.5 * (bottom + top))
-        return Block(centre, (0.5 * length, HALF_WIDTH, 0.5 * (top - bottom)))
-
-    def shifted(self, ahead: float) -> Block:
-        """The same so much [m] farther ahead."""
-        x, y, z = self.centre
-        return replace(self, centre=(x + ahead, y, z))
-
-
-class Terrain(ABC):
-    """What the ground is like, where it is not a level floor."""
-
-    __slots__ = ()
-
-    @property
-    def floor_pitch(self) -> float:
-        """Angle [rad] by which the whole floor is turned about y; negative rises ahead."""
-        return 0.0
-
-    @property
-    def floor_height(self) -> float:
-        """Of the whole floor [m], 0 or less."""
-        return 0.0
-
-    @property
-    def end(self) -> float:
-        """Where [m] ahead the ground has height 0 again for good; infinite if nowhere."""
-        return math.inf
-
-    @property
-    def pits(self) -> tuple[tuple[float, float], ...]:
-        """From where to where [m] ahead the ground of height 0 is missing, in order."""
-        return ()
-
-    @abstractmethod
-    def blocks(self) -> tuple[Block, ...]:
-        """What lies on the ground, or stands on the floor of the pits."""
-
-    def banks(self) -> tuple[Block, ...]:
-        """The ground between the pits, where there are any."""
-        edges = [-PLATFORM, *(x for pit in self.pits for x in pit)]
-        edges.append(edges[-1] + PLATFORM)
-        spans = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if a < b]
-        return tuple(Block.slab(a, b - a, self.floor_height, 0.0) for a, b in spans if self.pits)
 
 
 @typed()

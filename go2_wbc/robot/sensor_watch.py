@@ -30,6 +30,7 @@ from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.records import V3, Array3, Array4, Array4x3, Array12, Record, numbers_of, packed
 from go2_wbc.robot.imu_watch import (
+    SHAKEN,
     STRUCK,
     THROWN,
     WatchedImu,
@@ -340,11 +341,10 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
         stands = r.foot_forces[leg] > SENSED or borne[leg] - slack[leg] > LOADED
         bears = stands and borne[leg] > LOADED and is_sound(s, leg)
         s.stood[leg] = s.stood[leg] + dt if bears else 0.0
-        if max(borne[leg], r.foot_forces[leg]) > c.weight:
-            m.struck = STRUCK
+        m.struck = STRUCK if max(borne[leg], r.foot_forces[leg]) > c.weight else m.struck
         loads[leg] = borne[leg] if bears and m.unborne == 0.0 else 0.0
     m.is_found, m.turn[:] = 0.0, 0.0
-    judge_jump(m, jump, dt)
+    judge_jump(m, jump, bool(np.any((s.stood > 0.0) & (s.stood <= SHAKEN))), dt)
     watch_imu(s, r, c, places, speeds, loads, up, dt)
 
 

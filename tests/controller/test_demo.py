@@ -10,9 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from controller import GO2Controller
 from controller.demo import DEMO_STEPS, DemoProgress, Measurement, StepResult, run_demo
 from controller.demo.run import three_leg_minima
+from controller.demo.steps import terrain_steps
 from go2_wbc.errors import IkError, PlantTimeout
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.terrain import BOTH, Stairs
 from tests.controller.fake_go2 import FakeGo2
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -36,6 +40,19 @@ def test_the_demo_does_its_steps_and_leaves_the_controller_open_for_its_owner() 
     ]
     assert report.ok
     assert [step.reason for step in report.steps] == ["done"] * len(DEMO_STEPS)
+
+
+def test_over_a_terrain_the_robot_walks_by_sight_and_its_recording_has_the_ground() -> None:
+    step = Stairs(0.12, count=1, way=BOTH, landing=0.8)
+    plant = MujocoPlant(terrain=step, lidar=True, sensors="imu")
+    with GO2Controller(plant=plant) as go2:
+        report = run_demo(go2, steps=terrain_steps(step))
+        ground = go2.recording().ground
+    assert report.ok, report.steps
+    assert [item.name for item in report.steps] == ["stand", "walk", "cross", "stand_again"]
+    assert figure_of(report.steps[2], "up and down").measured == pytest.approx(0.12, abs=0.03)
+    on_it = (np.abs(ground[:, 0] - 1.2) < 0.3) & (np.abs(ground[:, 1]) < 0.5)
+    assert np.median(ground[on_it, 2]) == pytest.approx(0.12, abs=0.015)
 
 
 def test_the_walking_speed_is_measured_and_not_the_command() -> None:

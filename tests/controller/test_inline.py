@@ -4,14 +4,18 @@ import tomllib
 from dataclasses import fields
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from controller.inline import LONGEST, html_of
+from controller.seen_terrain import SeenTerrain
 from controller.sweeps.run import SweepResult
 from controller.sweeps.sweep_file import Row
 from go2_wbc import brief
+from go2_wbc.planning.height_map import HeightMap, fuse
 from go2_wbc.recording import Recording
 from motions import CheckedMotion, FeasibilityChecker, Timeline, load_motion
+from tests.viz.synthetic import step_ahead
 
 LARGEST = 1_200_000
 """Of ten seconds of a motion [bytes]."""
@@ -46,6 +50,15 @@ def test_a_sweep_is_a_table_and_a_recording_a_page(checked: CheckedMotion) -> No
     assert "<th>speed</th><td>0.5</td>" in shown
 
 
+def test_ground_that_was_seen_is_a_small_picture() -> None:
+    heights = HeightMap()
+    points = step_ahead(0.2, at=0.6) - [0.0, 0.0, 0.3]
+    fuse(heights, points, np.array([0.0, 0.0, 0.3]), np.eye(3), 0.01)
+    shown = html_of(SeenTerrain(heights, "")) or ""
+    assert shown.startswith("<img")
+    assert len(shown) < LARGEST / 10
+
+
 def test_what_has_no_page_is_left_to_its_line(checked: CheckedMotion) -> None:
     run = checked.recording()
     long = Recording(
@@ -61,5 +74,5 @@ def test_objects_find_their_page_by_an_entry_point() -> None:
     root = Path(__file__).parents[2]
     project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert project["entry-points"]["go2_wbc.inline"] == {"html": "controller.inline:html_of"}
-    for kind in (Timeline, CheckedMotion, Recording):
+    for kind in (Timeline, CheckedMotion, Recording, SeenTerrain):
         assert kind._repr_html_ is brief.inline_html

@@ -7,6 +7,7 @@ import pytest
 
 from controller.telemetry import BLOCK, Telemetry
 from go2_wbc.errors import CommandError
+from go2_wbc.planning.height_map import DOWNS, HeightMap, fuse
 from go2_wbc.robot.model import RobotModel
 from tests.controller.plants import lying_state
 
@@ -131,3 +132,17 @@ def test_memory_is_asked_for_in_pieces_too_small_for_huge_pages(model: RobotMode
     telemetry.record(model.snapshot(lying_state(0.0)), ALL, "first")
     assert telemetry._blocks[0].nbytes < HUGE_PAGES
     assert len(telemetry._blocks) == 1
+
+
+def test_ground_is_kept_when_it_is_left_behind_and_told_as_it_was_found_last(
+    model: RobotModel,
+) -> None:
+    telemetry, heights = Telemetry(model, CAPACITY), HeightMap()
+    for x, z in ((0.0, 0.1), (0.5, 0.2), (20.0, 0.3), (20.25, 0.4), (0.0, 0.15)):
+        point, place = np.array([[0.5, 0.0, z]]), np.array([x, 0.0, 0.0])
+        for _ in range(DOWNS):
+            fuse(heights, point, place, np.eye(3), 0.01)
+        telemetry.see(heights, place)
+    ground = telemetry.samples().recording().ground
+    found = dict(zip(ground[:, 0].round(2).tolist(), ground[:, 2].round(3).tolist(), strict=True))
+    assert found == {0.51: 0.15, 1.01: 0.2, 20.51: 0.3, 20.76: 0.4}

@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.legs import Leg
+from go2_wbc.planning.height_map import CELL
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.profile import find_profile
@@ -48,6 +49,12 @@ def synthetic_recording(*, script: tuple[tuple[str, float], ...]) -> Recording:
     v = np.zeros((len(time), 18))
     v[:, 0] = speed
     return Recording(time + 1.0, q, v, tau, forces, stance, com, margin, labels)
+
+
+def step_ahead(height: float, at: float) -> Float[np.ndarray, "n 3"]:
+    """Ground that has been seen, 2 m long and 1.2 m wide: a step of this height [m] at x [m]."""
+    x, y = np.meshgrid(CELL * (np.arange(-20, 60) + 0.5), CELL * (np.arange(-24, 24) + 0.5))
+    return np.column_stack([x.ravel(), y.ravel(), np.where(x.ravel() > at, height, 0.0)])
 
 
 def _posture(label: str, t: float, duration: float) -> tuple[Float[np.ndarray, "12"], np.ndarray]:

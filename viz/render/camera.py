@@ -101,7 +101,8 @@ def camera_path(
     ``robot`` says where the feet are; ``smoothing`` is the filter's standard deviation [s].
     """
     times = np.arange(0.0, recording.duration + _STEP, _STEP)
-    middles = [_middle(recording.q[row], robot) for row in nearest_rows(recording, times)]
+    rows, is_level = nearest_rows(recording, times), len(recording.ground) == 0
+    middles = [_middle(recording.q[row], robot, is_level=is_level) for row in rows]
     return times, smoothed(times, np.array(middles), smoothing)
 
 
@@ -126,8 +127,11 @@ def smoothed(
     return np.column_stack([np.interp(time, grid, column) for column in calm.T])
 
 
-def _middle(q: Float[np.ndarray, "19"], robot: PosedRobot) -> Float[np.ndarray, "3"]:
-    """Middle of the box around feet, nose and tail, from the floor to the highest of them."""
+def _middle(
+    q: Float[np.ndarray, "19"], robot: PosedRobot, *, is_level: bool
+) -> Float[np.ndarray, "3"]:
+    """Middle of the box around feet, nose and tail; on a level floor it begins there."""
     points = np.vstack([robot.feet(q), robot.on_trunk(_TRUNK_ENDS)])
     low, high = points.min(axis=0), points.max(axis=0)
-    return np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, high[2] / 2 + _HEADROOM])
+    low[2] = 0.0 if is_level else low[2]
+    return (low + high) / 2 + [0.0, 0.0, _HEADROOM]

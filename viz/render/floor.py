@@ -13,10 +13,10 @@ from viz.render.rasterizer import rasterize
 _LEAST_SCALE = 1e-4  # pixels closer than this to the horizon count as sky
 # Red, green, blue in 0..1: the two tiles, and the background from the picture's top to the horizon.
 _LIGHT_TILE, _DARK_TILE = (0.965, 0.970, 0.978), (0.905, 0.916, 0.934)
-_SKY_TOP, _HORIZON = (0.985, 0.988, 0.994), (0.930, 0.940, 0.955)
+_SKY_TOP, HORIZON = (0.985, 0.988, 0.994), (0.930, 0.940, 0.955)
 _TILE = 0.25  # [m] edge of a tile
 _FOG_START, _FOG_END = 1.2, 4.5  # [m] from the target: tiles begin to fade there, and are gone
-_SHADOW = 0.62  # darkness of a full shadow, 0..1
+SHADOW = 0.62  # darkness of a full shadow, 0..1
 _TEXELS = 320  # [px] edge of the square shadow texture
 _TEXELS_PER_METRE = _TEXELS / 2.0  # it covers a square of 2 m
 _SHARP_BELOW = 0.12  # [m] casters lower than this throw a sharp shadow
@@ -33,11 +33,11 @@ def paint_floor(
     horizon, x, y = _floor_points(camera)
     visible = _visibility(x, y, camera)
     checker = _checker(x, y)
-    lit = 1 - np.float32(_SHADOW) * _shadow_on_picture(camera, casters, light)
+    lit = 1 - np.float32(SHADOW) * _shadow_on_picture(camera, casters, light)
     width, height = camera.size
     picture = np.empty((height, width, 3), dtype=np.float32)
     ramp = np.linspace(0, 1, height, dtype=np.float32)[:, None] ** np.float32(0.7)
-    colors = zip(_SKY_TOP, _HORIZON, _DARK_TILE, _LIGHT_TILE, strict=True)
+    colors = zip(_SKY_TOP, HORIZON, _DARK_TILE, _LIGHT_TILE, strict=True)
     for channel, (top, bottom, dark, light_tile) in enumerate(colors):
         sky = top + (bottom - top) * ramp
         picture[:, :, channel] = sky
@@ -96,20 +96,31 @@ def _triangle_wave(value: Float[np.ndarray, "r w"]) -> Float[np.ndarray, "r w"]:
     return np.abs(value, out=value)
 
 
-def _shadow_on_picture(
-    camera: Camera, casters: Surface, light: Float[np.ndarray, "3"]
-) -> Float[np.ndarray, "h w"]:
-    """Share of light that the robot takes from each pixel of the floor, 0..1."""
+def shadow_texture(
+    camera: Camera, casters: Surface, light: Float[np.ndarray, "3"], height: float = 0.0
+) -> tuple[Float[np.ndarray, "s s"], Float[np.ndarray, "3 3"]]:
+    """Share of light that the robot takes from level ground of a height [m], 0..1.
+
+    With it goes the homography from a place there, (x, y, 1) [m], to its texel.
+    """
     scale, half = _TEXELS_PER_METRE, _TEXELS / 2
     left, top = (scale * float(value) for value in camera.p_world_target[:2])
     to_texel = np.array([[scale, 0, half - left], [0, -scale, half + top], [0, 0, 1]])
-    flat = casters.points[:, :2] - casters.points[:, 2:] * (light[:2] / light[2])
+    flat = casters.points[:, :2] - (casters.points[:, 2:] - height) * (light[:2] / light[2])
     texels = np.column_stack([flat, np.ones(len(flat))]) @ to_texel.T
     is_low = casters.points[:, 2][casters.triangles[:, 0]] < _SHARP_BELOW
     lit = 1.0
     for mask, blur in ((is_low, _BLUR_LOW), (~is_low, _BLUR_HIGH)):
         lit = lit * (1 - _blurred_mask(texels, casters.triangles[mask], blur * scale))
-    texture = Image.fromarray(np.round(255 * (1 - lit)).astype(np.uint8))
+    return 1 - lit, to_texel
+
+
+def _shadow_on_picture(
+    camera: Camera, casters: Surface, light: Float[np.ndarray, "3"]
+) -> Float[np.ndarray, "h w"]:
+    """Share of light that the robot takes from each pixel of the floor, 0..1."""
+    taken, to_texel = shadow_texture(camera, casters, light)
+    texture = Image.fromarray(np.round(255 * taken).astype(np.uint8))
     H = to_texel @ camera.H_floor_picture
     coefficients = tuple((H / H[2, 2]).ravel()[:8])
     shadow = texture.transform(

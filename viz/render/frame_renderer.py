@@ -14,6 +14,7 @@ from go2_wbc.legs import LEGS
 from go2_wbc.recording import Recording
 from viz.content import Annotation
 from viz.render.camera import Camera, camera_path, heading_path, nearest_rows
+from viz.render.ground import Relief
 from viz.render.mesh import Surface, arrow
 from viz.render.renderer import render
 from viz.render.robot_meshes import PosedRobot, visuals_of
@@ -76,6 +77,7 @@ class FrameRenderer:
             visuals.foot_radius,
         )
         self._path = camera_path(recording, self._robot, smoothing=style.smoothing)
+        self._ground = Relief(recording.ground) if len(recording.ground) else None
         self._heading = heading_path(recording, smoothing=style.turn_smoothing)
 
     def shoot(self, time: float) -> UInt8[np.ndarray, "h w 3"]:
@@ -83,7 +85,8 @@ class FrameRenderer:
         style, k = self._style, self._row(time)
         camera, robot = self._camera(time), self._robot.at(self._recording.q[k])
         turn = camera.azimuth - style.azimuth
-        return render(camera, robot, self._arrows(k), samples=style.samples, turn=turn)
+        arrows, look = self._arrows(k), {"samples": style.samples, "turn": turn}
+        return render(camera, robot, arrows, ground=self._ground, **look)
 
     def shoot_captioned(
         self, time: float, *, speed: float | int = 1.0, with_progress: bool = True

@@ -11,6 +11,7 @@ from jaxtyping import Float, Int, UInt8
 from go2_wbc.robot.rotations import yaw_rotation
 from viz.render.camera import Camera
 from viz.render.floor import paint_floor
+from viz.render.ground import Relief
 from viz.render.mesh import Surface
 from viz.render.rasterizer import plane_coefficients, rasterize
 
@@ -27,6 +28,7 @@ def render(
     robot: Surface,
     extras: Sequence[Surface] = (),
     *,
+    ground: Relief | None = None,
     samples: int = 2,
     turn: float = 0.0,
 ) -> UInt8[np.ndarray, "h w 3"]:
@@ -36,16 +38,19 @@ def render(
         camera: view and picture size.
         robot: the robot's surface; throws the shadow.
         extras: more geometry, without shadow and in front, such as arrows.
+        ground: the robot has seen.
         samples: edge of the sample grid in each pixel; 2 gives four samples.
         turn: of the lights about the vertical [rad], as when they move with the camera.
     """
     width, height = camera.size
     lights = towards_lights(turn)
     picture = paint_floor(camera, robot, lights[0])
-    solids = Surface.joined([robot, *extras])
+    relief = [] if ground is None else [ground.seen_by(camera, robot, lights[0])]
+    solids = Surface.joined([robot, *extras, *relief])
     finer = replace(camera, size=(samples * width, samples * height))
     projected = finer.project(solids.points)
-    projected[len(robot.points) :, 2] *= _EXTRAS_LEAD
+    shown_through = sum(len(extra.points) for extra in extras)
+    projected[len(robot.points) :, 2][:shown_through] *= _EXTRAS_LEAD
     brightness = _vertex_brightness(solids.normals, camera.R_camera_world[2], lights)
     color, coverage = _solids(solids, projected, brightness, camera.size, samples)
     picture *= 1 - coverage.reshape(height, width, 1)

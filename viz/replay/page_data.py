@@ -17,6 +17,7 @@ from go2_wbc.legs import LEGS
 from go2_wbc.recording import Recording
 from viz.content import MarginCurve, ReplayContent, Verdict
 from viz.render.camera import smoothed
+from viz.render.ground import COLORS, grid_of
 from viz.render.robot_meshes import PosedRobot, visuals_of
 from viz.replay.meshcat_scene import robot_scene
 from viz.replay.packing import Pack
@@ -65,6 +66,8 @@ _FRAME_RATE = 50.0  # [Hz] finer is not seen at 60 Hz screens, swings stay smoot
 _MOST_FRAMES = 6000  # keeps the page of a long recording small; the rate drops instead
 _MOST_MARGINS = 3000  # samples of a margin curve; the least of each step is kept
 _CAMERA_SMOOTHING = 0.7  # [s]
+UNKNOWN = -32768
+"""Height [mm] of a cell of ground that was not seen."""
 _PLAIN = {"stance": np.uint8, "margin": np.float32, "torque": np.float32}
 """How frames are stored that are not 16-bit numbers between their extremes."""
 
@@ -96,8 +99,15 @@ def content_text(content: ReplayContent, title: str, version: str = "") -> str:
         "sliders": [asdict(slider) for slider in content.sliders],
         "verdict": None,
         "ghost": None,
+        "ground": None,
         "written": None,
     }
+    if len(content.recording.ground):
+        grid = grid_of(content.recording.ground)
+        heights = np.where(np.isnan(grid.z), UNKNOWN, np.round(1000.0 * grid.z))
+        pack.add("ground", heights.astype(np.int16))
+        place = {"x": grid.x, "y": grid.y, "cell": grid.cell, "shape": grid.z.shape}
+        header["ground"] = {**place, "low": float(np.nanmin(grid.z)), "colors": COLORS}
     if content.sound:
         pack.add("sound", np.frombuffer(content.sound, np.uint8))
     if content.verdict is not None:
@@ -112,10 +122,10 @@ def replay_frames(recording: Recording) -> tuple[float, dict[str, np.ndarray]]:
     """A recording of any, also uneven, rate at even steps: frames per second, and rows by name.
 
     ``q`` has neighbouring quaternions in the same half-space, ``feet`` are the centres FL FR RL RR
-    and ``com`` the centre of mass [m], ``target`` is the smoothed ground position of the base [m],
-    ``stance`` the planned contacts. Of ``forces`` [N] and ``torque`` (the greatest of |torque| /
-    limit of any joint) it is the largest in the step, of the support's ``margin`` [m] the least, so
-    that a short peak is not lost; nan where that is undefined.
+    and ``com`` the centre of mass [m], ``target`` is the smoothed place of the base on the ground
+    [m], ``stance`` the planned contacts. Of ``forces`` [N] and ``torque`` (the greatest of |torque|
+    / limit of any joint) it is the largest in the step, of the support's ``margin`` [m] the least,
+    so that a short peak is not lost; nan where that is undefined.
     """
     rate = min(_FRAME_RATE, (_MOST_FRAMES - 1) / recording.duration)
     count = max(2, int(np.floor(recording.duration * rate)) + 1)
@@ -126,12 +136,18 @@ def replay_frames(recording: Recording) -> tuple[float, dict[str, np.ndarray]]:
     rows[-1] = last
     visuals, q = visuals_of(recording), _continuous(recording.q[rows])
     robot = PosedRobot(visuals)
+    feet = np.array([robot.feet(row) for row in q])
+    heights = feet[:, :, 2].mean(axis=1) - visuals.foot_radius
+    heights = heights if len(recording.ground) else np.zeros(count)
+    below = np.interp(recording.time, wanted, heights)
+    places = np.column_stack([recording.q[:, :2], below])
+    target = smoothed(recording.time, places, _CAMERA_SMOOTHING)
     ratio = np.max(np.abs(recording.tau) / visuals.description.efforts, axis=1)
     return rate, {
         "q": q,
-        "feet": np.array([robot.feet(row).ravel() for row in q]),
+        "feet": feet.reshape(-1, 12),
         "com": recording.p_world_com[rows],
-        "target": smoothed(recording.time, recording.q[:, :2], _CAMERA_SMOOTHING)[rows],
+        "target": target[rows],
         "forces": np.maximum.reduceat(recording.foot_forces, rows),
         "stance": recording.stance[rows],
         "margin": np.fmin.reduceat(recording.support_margin, rows),

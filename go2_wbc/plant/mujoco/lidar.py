@@ -1,9 +1,10 @@
-"""A lidar like the L1 below a Go2's nose, on the terrain of a simulated plant.
+"""A lidar like the L1 below a Go2's nose, or a depth camera in it, on a simulated plant's terrain.
 
-Its rays fill a cone evenly, along a spiral that begins anew in each scan, as the sensor never
-repeats its pattern. They are cast against a model of the ground alone: against the meshes of the
-robot as well it took 100 times as long. The legs stand in the way all the same: a ray that passes
-within ``LEG_RADIUS`` of one's axis returns nothing, as a driver leaves the robot itself out.
+The lidar's rays fill a cone evenly, along a spiral that begins anew in each scan, as the sensor
+never repeats its pattern; the camera's are those of few, large pixels. They are cast against a
+model of the ground alone: against the meshes of the robot as well it took 100 times as long. The
+legs stand in the way all the same: a ray that passes within ``LEG_RADIUS`` of one's axis returns
+nothing, as a driver leaves the robot itself out.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -19,10 +21,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.arguments import typed
+from go2_wbc.errors import ConfigError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant.base import Scan
 from go2_wbc.plant.mujoco.model import add_floor, add_terrain
-from go2_wbc.plant.mujoco.setup import PlantSetup
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
@@ -58,6 +60,76 @@ class LidarConfig:
     pitch: float = math.radians(45.0)
     cone: float = math.radians(80.0)
 
+    @property
+    def place(self) -> Float[np.ndarray, "3"]:
+        """Where it is, in the base frame [m]."""
+        return PLACE
+
+    def deviation(self, _distance: Float[np.ndarray, " n"]) -> float:
+        """Of the distances [m]."""
+        return self.noise
+
+    def directions(self, rng: np.random.Generator) -> Float[np.ndarray, "n 3"]:
+        """Of the rays of a scan, its axis along x."""
+        turns = np.arange(self.rays) + 0.5
+        cosine = 1.0 - (1.0 - math.cos(self.cone)) * turns / self.rays
+        turns, sine = GOLDEN_ANGLE * turns, np.sqrt(1.0 - cosine**2)
+        turn = rng.uniform(0.0, 2.0 * math.pi)
+        return np.column_stack([cosine, sine * np.sin(turns + turn), sine * np.cos(turns + turn)])
+
+
+@typed()
+@dataclass(frozen=True, slots=True)
+@ranged(POSITIVE, noise=NOT_NEGATIVE, latency=NOT_NEGATIVE)
+class DepthConfig:
+    """Numbers of the depth camera; range and angles of a RealSense D435, the others guessed.
+
+    Attributes:
+        rate: pictures a second.
+        columns, rows: of a picture.
+        noise: standard deviation of a distance d, over d^2 [1/m]; the D435's is 0.08 pixels of 425
+            in its focal length, over the 5 cm between its eyes.
+        nearest, farthest: range [m].
+        latency: time [s] from a picture until it is told.
+        pitch: angle [rad] of its axis below the horizontal.
+        width, height: angles [rad] of view.
+    """
+
+    rate: float = 15.0
+    columns: int = 48
+    rows: int = 32
+    noise: float = 0.004
+    nearest: float = 0.3
+    farthest: float = 3.0
+    latency: float = 0.03
+    pitch: float = math.radians(30.0)
+    width: float = math.radians(87.0)
+    height: float = math.radians(58.0)
+
+    @property
+    def rays(self) -> int:
+        """Of a picture."""
+        return self.columns * self.rows
+
+    @property
+    def place(self) -> Float[np.ndarray, "3"]:
+        """Where it is, in the base frame [m]: that of the Go2's camera."""
+        return np.array((0.327, 0.0, 0.043))
+
+    def deviation(self, distance: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+        """Of the distances [m]."""
+        return self.noise * distance**2
+
+    def directions(self, _rng: np.random.Generator) -> Float[np.ndarray, "n 3"]:
+        """Of the rays of a picture, its axis along x."""
+        columns, rows = (
+            math.tan(0.5 * angle) * (2.0 * np.arange(n) + 1.0 - n) / n
+            for angle, n in ((self.width, self.columns), (self.height, self.rows))
+        )
+        left, up = (part.ravel() for part in np.meshgrid(columns, rows))
+        rays = np.column_stack([np.ones(self.rays), left, up])
+        return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+
 
 PLACE = np.array((0.30, 0.0, -0.03))
 """Of the lidar, in the base frame [m]."""
@@ -72,12 +144,30 @@ def ground_model(terrain: Terrain | None) -> mujoco.MjModel:
     return spec.compile()
 
 
-class Lidar:
-    """Takes scans of a terrain."""
+def chosen(
+    lidar: LidarConfig | bool, depth: DepthConfig | bool, mjcf: Path | str | None
+) -> LidarConfig | DepthConfig | None:
+    """The numbers of what a robot sees with; None of a blind one.
+
+    Raises:
+        ConfigError: for both, or where the ground is not known.
+    """
+    if lidar and depth:
+        raise ConfigError("the robot sees with a lidar or with a depth camera, not with both")
+    if (lidar or depth) and mjcf is not None:
+        name = "lidar" if lidar else "depth"
+        raise ConfigError(f"{name} is only for the built model: of an mjcf nobody knows the ground")
+    if isinstance(lidar, LidarConfig) or lidar:
+        return LidarConfig() if lidar is True else lidar
+    return (DepthConfig() if depth is True else depth) or None
+
+
+class RangeSensor:
+    """Takes scans of a terrain: a lidar or a depth camera."""
 
     def __init__(
         self,
-        config: LidarConfig,
+        config: LidarConfig | DepthConfig,
         terrain: Terrain | None,
         robot: tuple[mujoco.MjModel, mujoco.MjData],
         rng: np.random.Generator,
@@ -93,19 +183,6 @@ class Lidar:
         self._feet = [model.geom(name).id for name in FOOT_NAMES]
         self._told: deque[Scan] = deque()
         self._next = 0.0
-        turns = np.arange(config.rays) + 0.5
-        self._cosine = 1.0 - (1.0 - math.cos(config.cone)) * turns / config.rays
-        self._turns = GOLDEN_ANGLE * turns
-
-    @staticmethod
-    def on(
-        lidar: LidarConfig | bool,
-        setup: PlantSetup,
-        robot: tuple[mujoco.MjModel, mujoco.MjData],
-    ) -> Lidar:
-        """That of a robot, in the place that its ``setup`` tells."""
-        config = lidar if isinstance(lidar, LidarConfig) else LidarConfig()
-        return Lidar(config, setup.terrain, robot, np.random.default_rng((setup.seed, config.rays)))
 
     def scan(self, time: float) -> Scan | None:
         """What it tells at a ``time`` [s]; ask in every control period."""
@@ -129,24 +206,21 @@ class Lidar:
     def _take(self, time: float) -> Scan:
         config, rng, robot = self._config, self._rng, self._robot
         R = robot.xmat[self._base].reshape(3, 3)
-        rays = self._rays(rng.uniform(0.0, 2.0 * math.pi))
-        origin, world = robot.xpos[self._base] + R @ PLACE, rays @ R.T
+        c, s = math.cos(config.pitch), math.sin(config.pitch)
+        x, y, z = config.directions(rng).T
+        rays = np.column_stack([c * x + s * z, y, c * z - s * x])
+        origin, world = robot.xpos[self._base] + R @ config.place, rays @ R.T
         distance, hit = np.empty(config.rays), np.empty(config.rays, dtype=np.int32)
         settings = None, 1, -1, hit, distance, None, config.rays, config.farthest
         mujoco.mj_multiRay(self._model, self._data, origin, world.ravel(), *settings)
-        shown = (hit >= 0) & (distance >= config.nearest)
+        shown = (hit >= 0) & (distance >= config.nearest) & (distance <= config.farthest)
         shown &= ~self._behind_legs(origin, world, distance)
-        distance += config.noise * rng.standard_normal(config.rays)
-        points = PLACE + distance[:, None] * rays
-        return Scan(time, points[shown], config.noise)
-
-    def _rays(self, turn: float) -> Float[np.ndarray, "n 3"]:
-        """Directions in the base frame."""
-        c, s = math.cos(self._config.pitch), math.sin(self._config.pitch)
-        sine = np.sqrt(1.0 - self._cosine**2)
-        aside = sine * np.cos(self._turns + turn)
-        x, y, z = self._cosine, sine * np.sin(self._turns + turn), aside
-        return np.column_stack([c * x + s * z, y, c * z - s * x])
+        deviation = np.broadcast_to(config.deviation(distance), distance.shape)
+        points = (
+            config.place + (distance + deviation * rng.standard_normal(config.rays))[:, None] * rays
+        )
+        typical = math.sqrt(np.mean(deviation[shown] ** 2)) if shown.any() else 0.0
+        return Scan(time, points[shown], typical)
 
     def _behind_legs(
         self,

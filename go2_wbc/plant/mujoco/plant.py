@@ -19,7 +19,7 @@ from go2_wbc.plant.base import Plant, Scan
 from go2_wbc.plant.faults import HELD_TIME, Faults, InjectedFault
 from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN, bin_forces, read_joints
-from go2_wbc.plant.mujoco.lidar import Lidar, LidarConfig
+from go2_wbc.plant.mujoco.lidar import DepthConfig, LidarConfig, RangeSensor, chosen
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
 from go2_wbc.plant.mujoco.pushes import Pushes
 from go2_wbc.plant.mujoco.settling import settle
@@ -74,6 +74,7 @@ class MujocoPlant(Plant):
         visuals: also load the visual meshes (slower), for the viewer and for rendering.
         delay: time [s] after which a command acts, rounded to whole control periods.
         lidar: whether it has one, or its numbers; only without ``mjcf``.
+        depth: the same of a depth camera that looks ahead, in its place.
 
     Raises:
         ClosedError: from all calls, once it is closed.
@@ -109,13 +110,11 @@ class MujocoPlant(Plant):
         delay: float = 0.0,
         keyframe: str | None = None,
         lidar: LidarConfig | bool = False,
+        depth: DepthConfig | bool = False,
     ) -> None:
         if sensors not in SENSORS:
             raise ConfigError(unknown_name("sensors", sensors, SENSORS))
-        if lidar and mjcf is not None:
-            raise ConfigError(
-                "lidar is only for the built model: of an mjcf nobody knows the ground"
-            )
+        sight = chosen(lidar, depth, mjcf)
         setup = PlantSetup(
             mjcf=mjcf,
             urdf=urdf,
@@ -163,9 +162,10 @@ class MujocoPlant(Plant):
         self._senses: Proprioception | None = None
         self._state: RobotState | None = None
         self._imu: ImuSample | None = None
-        self._lidar: Lidar | None = None
-        if lidar:
-            self._lidar = Lidar.on(lidar, setup, (self._model, self._data))
+        self._ranges: RangeSensor | None = None
+        if sight is not None:
+            rng, body = np.random.default_rng((seed, sight.rays)), (self._model, self._data)
+            self._ranges = RangeSensor(sight, terrain, body, rng)
         self.write(resting)
         self._ticks, self._data.time = 0, 0.0
         if sensors == "imu":
@@ -273,7 +273,7 @@ class MujocoPlant(Plant):
 
     def scan(self) -> Scan | None:
         """See ``Plant.scan``."""
-        return None if self._lidar is None else self._lidar.scan(self.time)
+        return None if self._ranges is None else self._ranges.scan(self.time)
 
     def imu(self) -> ImuSample:
         """The inertial measurement unit's reading; its accelerometer lags by one physics step."""
@@ -409,7 +409,7 @@ class MujocoPlant(Plant):
             imu=self._imu,
             senses=None if self._senses is None else self._senses.save(),
             faults=self._faults.save(),
-            lidar=None if self._lidar is None else self._lidar.save(),
+            lidar=None if self._ranges is None else self._ranges.save(),
         )
 
     @typed(late=True)
@@ -429,8 +429,8 @@ class MujocoPlant(Plant):
         if self._senses is not None and saved.senses is not None:
             self._senses.restore(saved.senses)
         self._faults.restore(saved.faults)
-        if self._lidar is not None and saved.lidar is not None:
-            self._lidar.restore(saved.lidar)
+        if self._ranges is not None and saved.lidar is not None:
+            self._ranges.restore(saved.lidar)
 
     def close(self) -> None:
         """Ends the plant; every later call but ``close`` raises ``ClosedError``."""

@@ -5,6 +5,7 @@ import math
 import os
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,10 @@ from controller.cli.demo import render
 from controller.cli.main import high_five_demo
 from controller.cli.progress import ProgressLine, progress_bar
 from controller.demo import DemoReport, DemoTotals, Measurement, StepResult, run_demo
+from controller.demo.steps import TERRAINS
 from go2_wbc.config import Config
 from go2_wbc.errors import ConfigError, PlantTimeout
+from go2_wbc.plant.terrain import Stairs
 from tests.controller.cli.conftest import Run, Said
 from tests.controller.fake_go2 import FakeGo2
 from tests.script_server import run_script
@@ -173,11 +176,20 @@ def test_options_reach_plant_controller_and_engine(
     assert (config.backend, config.wbc.solver, config.locomotion.height) == ("full", "proxqp", 0.27)
 
 
+def test_over_a_terrain_it_has_its_own_sensors_and_a_lidar(
+    tmp_path: Path, seen: dict[str, Any], run: Run
+) -> None:
+    run("demo", "--no-media", "--out", tmp_path, "--terrain", "stairs", code=ExitCode.FAILED)
+    assert isinstance(seen["terrain"], Stairs)
+    assert (seen["lidar"], seen["sensors"]) == (True, "imu")
+
+
 def test_without_options_the_robot_starts_exactly_headless_and_as_fast_as_the_cpu(
     tmp_path: Path, seen: dict[str, Any], run: Run
 ) -> None:
     run("demo", "--no-media", "--out", tmp_path)
     assert seen["initial_joint_noise"] == 0.0
+    assert (seen["terrain"], seen["lidar"], seen["sensors"]) == (None, False, "ideal")
     assert (seen["realtime"], seen["viewer"]) == (False, False)
 
 
@@ -194,6 +206,7 @@ def test_the_choices_are_those_of_the_engine() -> None:
         assert check_solver(solver) == solver
     with pytest.raises(SolverUnavailable):
         check_solver("no such solver")
+    assert tuple(TERRAINS) == demo.TERRAINS
 
 
 def test_the_script_of_the_course_is_the_same_command(
@@ -222,6 +235,15 @@ def test_the_filmstrip_shows_sitting_swinging_and_the_raised_paw() -> None:
     assert 0.0 <= sit.start + sit.duration - recording.time[rows[0]] < 0.05
     assert inside[rows[1]]
     assert stance[rows[2]].tolist() == [True, False, True, True]
+
+
+def test_of_a_walk_over_a_terrain_the_filmstrip_shows_three_moments() -> None:
+    go2 = FakeGo2()
+    report = run_demo(go2)
+    forward = replace(report.steps[3], name="cross")
+    times = demo.filmstrip_times(replace(report, steps=(forward,)), go2.recording())
+    start = forward.start - go2.recording().time[0]
+    assert times == pytest.approx([start + 0.5, start + 1.0, start + 1.5])
 
 
 def test_a_run_without_these_moments_leaves_the_choice_to_the_filmstrip() -> None:

@@ -15,7 +15,7 @@ from go2_wbc.planning.force_mpc import (
 )
 from go2_wbc.planning.gait_clock import Clock
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
-from go2_wbc.planning.mpc import NODES, STEP, Horizon
+from go2_wbc.planning.mpc import INTERVAL, NODES, STEP, Horizon
 from go2_wbc.planning.trunk import Trunk
 from go2_wbc.planning.walk import Planner, Walk
 from go2_wbc.robot.rotations import yaw_rotation
@@ -131,7 +131,11 @@ def test_on_a_straight_way_arms_reach_to_feet_that_stay_and_to_those_below_the_h
 def test_the_accelerations_are_those_that_the_planned_forces_make() -> None:
     """Newton and Euler, about the CoM, of the forces of the feet that stand."""
     now, planner = steady(0.3)
-    plan, h = planner.update(at(now, 0.002), ARC), planner._state.horizon
+    plan, h = (
+        [planner.update(at(now, k * INTERVAL), ARC) for k in range(17)][-1],
+        planner._state.horizon,
+    )
+    assert np.abs(h.share[0] - h.share[1]).min() > 0.5, "feet land and leave in the first nodes"
     stood = np.maximum(h.share[0], CONFIG.mpc.least_share)[:, None]
     forces = np.where(plan.stance[:, None], h.forces[0] / stood, 0.0)
     np.testing.assert_allclose(plan.f_world_feet, forces, atol=1e-12)

@@ -11,6 +11,7 @@ from go2_wbc.planning.ground import (
     DELAY,
     FAST,
     FAST_HASTE,
+    FIRST_WAY,
     FRICTION_RISE,
     GROUND_SHARE,
     HALF_SPEED,
@@ -19,10 +20,9 @@ from go2_wbc.planning.ground import (
     LATE_ASIDE,
     LATE_HASTE,
     LATE_SPEED,
+    LEAN_RATE,
     LEAST_FRICTION,
-    LIFT,
     LIFT_RATE,
-    LOWERED,
     MOST_FRICTION,
     MOST_RAISE,
     MOST_SLOPE,
@@ -41,9 +41,9 @@ from go2_wbc.planning.ground import (
     Slip,
     apex_raise,
     carry_ground,
-    carry_higher,
     delay,
     exerted_ratio,
+    expect_steps,
     ground_at,
     ground_below,
     haste,
@@ -53,6 +53,7 @@ from go2_wbc.planning.ground import (
     note_stumble,
     observe_slip,
     slow_down,
+    tilt,
 )
 from go2_wbc.robot.state import Snapshot
 from tests import engine_helpers as helpers
@@ -190,25 +191,6 @@ def test_an_upright_cone_lies_within_that_about_the_normal_of_a_slope(friction: 
     assert level_friction(plane(on_plane(np.zeros(2))), friction, 0.01) == friction
 
 
-@pytest.mark.parametrize(
-    ("slope", "is_uneven", "lift"),
-    [(1.1, True, LIFT), (0.9, True, 0.0), (-1.1, True, 0.0), (1.1, False, 0.0)],
-)
-def test_down_uneven_ground_it_goes_with_a_higher_trunk(
-    slope: float, is_uneven: bool, lift: float
-) -> None:
-    """And back where it no longer leads down; it gets there no faster than told."""
-    ground = Ground(slope=[0.0, slope * LOWERED])
-    carry_higher(ground, (0.0, -0.5), is_uneven, TICK)
-    assert ground.lift == pytest.approx(min(lift, LIFT_RATE * TICK))
-    for _ in range(500):
-        carry_higher(ground, (0.0, -0.5), is_uneven, TICK)
-    assert ground.lift == lift
-    for _ in range(500):
-        carry_higher(ground, (0.0, 0.0), is_uneven, TICK)
-    assert ground.lift == 0.0
-
-
 def test_feet_that_land_on_another_plane_turn_it_there() -> None:
     ground, new = plane(on_plane(np.zeros(2))), on_plane(SLOPE, 0.43)
     pairs = np.array([True, False, False, True])
@@ -237,6 +219,36 @@ def test_a_step_raises_the_swing_for_a_while_and_smooth_ground_does_not() -> Non
         ground.slope[:] = steep, 0.0
         assert apex_raise(ground, CONFIG) == pytest.approx(raised)
     assert delay(ground) == 0.0
+
+
+def test_the_trunk_is_carried_for_the_next_step_up_until_the_ground_falls_or_a_way_is_come() -> (
+    None
+):
+    snapshot, feet = on_plane(np.zeros(2)), np.ones(4, dtype=bool)
+    walking, ahead = snapshot.replaced(v_world_com=np.array([-0.3, 0.4, 0.0])), (-0.3, 0.4)
+    ground = plane(snapshot)
+
+    def carried(time: float) -> tuple[float, tuple[float, float]]:
+        expect_steps(ground, CONFIG, walking, ahead, time)
+        return ground.lift, tilt(ground)
+
+    note_stumble(ground)
+    assert carried(0.01) == (0.0, (0.0, 0.0)), "a brush at speed"
+    ground.rough_way = 9.0
+    lift, lean = carried(0.01)
+    assert lift == pytest.approx(0.01 * LIFT_RATE)
+    assert lean == pytest.approx((-0.01 * LEAN_RATE, 0.01 * LEAN_RATE))
+    raised = CONFIG.first_lift, pytest.approx(CONFIG.first_lean * np.array(ahead) / 0.5)
+    assert carried(0.5) == raised
+    carried(FIRST_WAY / 0.5)
+    assert carried(0.5) == (0.0, (0.0, 0.0))
+    for off, share in ((1.1 * ROUGH, 1.0), (-3.0 * ROUGH, 0.0)):
+        learn(ground, snapshot.p_world_feet + [0.0, 0.0, off], feet)
+        ground.slope[:] = 0.0
+        assert carried(0.5)[0] == pytest.approx(share * CONFIG.first_lift)
+    note_stumble(ground)
+    ground.slope[0] = 0.5 * STEEP
+    assert carried(0.5)[0] == pytest.approx(0.5 * CONFIG.first_lift), "as far as it is level"
 
 
 def sliding(

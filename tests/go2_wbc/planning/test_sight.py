@@ -12,6 +12,7 @@ from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.planning.sight import (
     DROP,
     FLIGHT_SPEED,
+    LIFT,
     RISE,
     SPEED,
     STOP,
@@ -141,6 +142,33 @@ def test_feet_are_put_beside_edges_and_swing_over_them(start: float, kind: str) 
                 assert distance_to_edge(terrain, step.chosen) > NEAR - 0.015
     assert landed > 10
     assert swung > 100
+
+
+def test_a_trunk_that_sways_drags_no_foot_over_an_edge() -> None:
+    """The blind foothold of each swing moves aside by 8 cm: over the gap between two stones."""
+    terrain = Stones(start=0.05, count=6)
+    walking, chosen = planner(exact_map(terrain, aside=0.6)), []
+    for n in range(1, 2000):
+        q, v = standing_q(0.30), np.zeros(18)
+        v[0], v[1] = 0.3, 0.2 * math.cos(2.0 * math.pi * 0.002 * n / 0.25)
+        q[0] = 0.3 * 0.002 * n - 0.3
+        walking.update(MODEL.snapshot(state_of(q, v, 0.002 * n)), VelocityCommand(0.3))
+        feet = [foot for foot in walking._state.feet if foot.step.is_sighted]
+        chosen += [foot.step.goal[:2].copy() for foot in feet if n % 20 == 0 and q[0] > 0.3]
+    around = 0.02 * np.array([(x, y) for x in (-1, 1) for y in (-1, 1)])
+    assert len(chosen) > 40
+    for place in chosen:
+        assert true_heights(terrain, place + around).min() > -0.01
+
+
+@pytest.mark.parametrize(("height", "lift"), [(0.02, 0.0), (0.16, LIFT)])
+def test_down_steps_the_trunk_is_carried_higher(height: float, lift: float) -> None:
+    walking = planner(exact_map(Stairs(height, 4, 0.31, start=0.3, way=DOWN)))
+    q = standing_q()
+    q[0], q[2] = 0.5, q[2] - height
+    for n in range(1, 500):
+        walking.update(MODEL.snapshot(state_of(q, time=0.002 * n)), VelocityCommand(0.3))
+    assert walking.sight.lift == pytest.approx(lift, abs=1e-3)
 
 
 def distance_to_edge(terrain: Terrain, place: np.ndarray) -> float:

@@ -9,7 +9,7 @@ import pytest
 from go2_wbc.algebra.linear import triple
 from go2_wbc.compilation import plain
 from go2_wbc.legs import FOOT_NAMES
-from go2_wbc.robot.imu_watch import WatchedImu, judge_jump
+from go2_wbc.robot.imu_watch import CALM, SHAKEN, WatchedImu, judge_jump
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.sensor_watch import (
@@ -303,7 +303,7 @@ def test_what_turns_for_two_readings_is_no_jump(before: float, after: float, may
     """Robots whose commands are late land hard, and lost their gyro by it."""
     imu = WatchedImu(stood=1.0)
     for n, change in enumerate((0.0, before, 0.43, after, 0.0)):
-        judge_jump(imu, (change, 0.0, 0.0), DT * (1.0 + 1e-12 * n))
+        judge_jump(imu, (change, 0.0, 0.0), False, DT * (1.0 + 1e-12 * n))
     assert bool(imu.jump_time > 0.0) is may_err
 
 
@@ -376,3 +376,21 @@ def test_speeds_and_gyro_are_read_through_their_noise(noise: float) -> None:
     assert watch.faults == ()
     told = noise_of_gyro(watch.speed_noise)
     assert told == pytest.approx(0.8 if noise == 1.0 else 0.0, rel=0.2)
+
+
+def test_a_jerk_as_a_foot_lands_is_no_jump_of_the_gyro() -> None:
+    # On stairs of 13 cm 2 of 20 sound gyros were named, and the robots stopped.
+    imu, jerk = WatchedImu(stood=CALM), (0.5, 0.0, 0.0)
+    judge_jump(imu, jerk, True, DT)
+    assert imu.jump_time == 0.0
+    judge_jump(imu, ZERO, False, DT)
+    judge_jump(imu, jerk, False, DT)
+    assert imu.jump_time > 0.0
+    judge_jump(imu, ZERO, True, DT)  # a foot whose load is measured a little later
+    assert imu.jump_time == 0.0
+    judge_jump(imu, ZERO, False, DT)
+    judge_jump(imu, jerk, False, DT)
+    for _ in range(round(SHAKEN / DT)):
+        judge_jump(imu, ZERO, False, DT)
+    judge_jump(imu, ZERO, True, DT)
+    assert imu.jump_time > SHAKEN

@@ -7,8 +7,10 @@ import pytest
 
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.profile import find_profile
+from tests.viz.synthetic import step_ahead
 from viz.render.camera import Camera
 from viz.render.floor import paint_floor
+from viz.render.ground import Relief, grid_of
 from viz.render.mesh import Surface
 from viz.render.rasterizer import rasterize
 from viz.render.renderer import render, towards_lights
@@ -106,3 +108,27 @@ def test_more_samples_only_smooth_the_edges(robot: PosedRobot, q: np.ndarray) ->
     fine = render(_camera(), surface, samples=3).astype(float)
     assert np.abs(coarse - fine).mean() < 3.0
     assert np.abs(coarse - fine).max() > 20.0
+
+
+def test_ground_that_was_seen_hides_the_floor_and_takes_the_shadow(
+    robot: PosedRobot, q: np.ndarray
+) -> None:
+    camera, surface = _camera(), robot.at(q)
+    relief = Relief(step_ahead(0.2, at=0.6))
+    empty, seen = render(camera, surface), render(camera, surface, ground=relief)
+    assert 0.2 < (np.abs(seen.astype(int) - empty).max(axis=2) > 40).mean() < 0.8
+    lit = relief.seen_by(camera, _no_more(surface), towards_lights()[0]).colors
+    shaded = relief.seen_by(camera, surface, towards_lights()[0]).colors
+    assert 0.01 < (shaded < lit - 0.1).any(axis=1).mean() < 0.2
+
+
+def test_what_is_torn_or_stands_out_alone_is_not_drawn() -> None:
+    ground = step_ahead(0.2, at=0.6)
+    hole = np.hypot(ground[:, 0], ground[:, 1]).argmin()
+    ground[hole + 7, 2] = 0.3
+    ground = np.vstack([np.delete(ground, hole, axis=0), [[1.8, 0.0, 0.1]]])
+    z = grid_of(ground).z[:80]
+    assert np.isnan(z).sum() == 4  # its corners
+    assert set(z[~np.isnan(z)].tolist()) == {0.0, 0.2}
+    assert np.isnan(grid_of(ground).z[80:]).all()
+    assert grid_of(ground, most=2000).cell == 0.05

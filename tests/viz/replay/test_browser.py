@@ -1,6 +1,7 @@
 """The replay page in a real Chromium, from a file, offline."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from go2_wbc.recording import Recording
 from tests.viz.replay.browsing import DRAWN, Tab
 from tests.viz.replay.conftest import OpenPage
+from tests.viz.synthetic import step_ahead
 
 _FRAME_TRAVEL = 0.006  # [m] the robot moves this far in half a frame
 
@@ -101,7 +103,7 @@ def test_hiding_the_forces_changes_the_picture(browser: Tab) -> None:
 
 def test_the_camera_follows_the_robot(browser: Tab) -> None:
     ask = (
-        "[replay.scene.viewer.controls.target.x, replay.data.target[2 * replay.data.frameAt({t})]]"
+        "[replay.scene.viewer.controls.target.x, replay.data.target[3 * replay.data.frameAt({t})]]"
     )
     browser.evaluate("replay.scrub(0); replay.scene.setView('corner')")
     before = browser.evaluate(ask.format(t=0))
@@ -165,3 +167,15 @@ def test_text_is_readable_and_the_picture_fits_the_page_by_night_and_by_day(
     brightness = browser.stage().mean()
     assert (brightness < 110) if scheme == "dark" else (brightness > 180)
     assert browser.complaints == []
+
+
+def test_the_ground_that_was_seen_is_drawn_by_its_height(
+    recording: Recording, open_page: OpenPage
+) -> None:
+    with open_page(replace(recording, ground=step_ahead(0.2, at=0.45))) as tab:
+        tab.evaluate("replay.scrub(0.2); replay.scene.setView('top')")
+        stage = tab.stage().astype(int)
+        assert tab.complaints == []
+    redder = stage[:, :, 0] - stage[:, :, 2]
+    assert (redder > 40).mean() > 0.05  # the step, and the level before it
+    assert (redder < -30).mean() > 0.1

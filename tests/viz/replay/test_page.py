@@ -19,6 +19,7 @@ from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
 from motions import FeasibilityChecker
 from tests.viz.page_reader import packed_parts, placement, read_data
+from tests.viz.synthetic import step_ahead
 from tests.viz.verdicts import made_up_verdict
 from viz.content import ReplayContent
 from viz.render.robot_meshes import load_robot_visuals
@@ -39,6 +40,17 @@ def page(recording: Recording, tmp_path_factory: pytest.TempPathFactory) -> str:
 
 def test_the_page_is_small(page: str) -> None:
     assert len(page.encode()) < PAGE_LIMIT / 2
+
+
+def test_the_ground_that_was_seen_is_in_the_page(recording: Recording, tmp_path: Path) -> None:
+    ground = step_ahead(0.2, at=0.5)
+    page = viz.export_html(replace(recording, ground=ground), tmp_path / "a.html", title="a")
+    header, arrays = read_data(page.read_text(encoding="utf-8"))
+    x, y, cell = (header["ground"][name] for name in ("x", "y", "cell"))
+    row, column = round((1.0 - x) / cell), round((0.3 - y) / cell)
+    assert (arrays["ground"][row, column], arrays["ground"][0, 0]) == (200, -32768)
+    assert arrays["target"].shape == (header["frames"], 3)
+    assert arrays["target"][:, 2] == pytest.approx(0.0, abs=0.1)
 
 
 def test_nothing_in_the_page_is_loaded_from_elsewhere(page: str) -> None:

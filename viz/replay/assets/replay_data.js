@@ -11,7 +11,7 @@ function unpackElement(id) {
   return unpack(document.getElementById(id).textContent);
 }
 
-const ARRAY_TYPES = { Float32Array, Uint32Array, Uint16Array, Int8Array, Uint8Array };
+const ARRAY_TYPES = { Float32Array, Uint32Array, Uint16Array, Int16Array, Int8Array, Uint8Array };
 
 // A JSON header and named arrays.
 class Pack {
@@ -76,6 +76,7 @@ class ReplayData extends Run {
     this.ghost = pack.header.ghost ? new Run(pack, "ghost.", pack.header.ghost) : null;
     this.written = pack.header.written ? new Run(pack, "written.", pack.header.written) : null;
     this.duration = Math.max(...[this, this.ghost, this.written].map((run) => (run ? run.end : 0)));
+    this.ground = pack.header.ground ? { ...pack.header.ground, heights: pack.array("ground") } : null;
     this.sound = this.header.has_sound ? pack.array("sound") : null; // an MP3 file
     this.annotations = this.header.verdict ? this.header.verdict.annotations : [];
     this.curves = (this.header.verdict ? this.header.verdict.curves : []).map((curve, k) => ({

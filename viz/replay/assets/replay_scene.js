@@ -45,6 +45,7 @@ class RobotScene {
   // Takes other data, to be shown by `show`; the camera stays where it is.
   use(data) {
     this.data = data;
+    this.stage.useGround(data);
     this.makePaths();
     this.steps.use(data);
     this.ghosts.forEach((ghost) => ghost.use(data));
@@ -224,7 +225,7 @@ class RobotScene {
   // Below a foot whose centre is at z. Simulated feet press a little into the floor, which would hide
   // what is drawn there.
   underside(z) {
-    return Math.max(z - this.footRadius, 0);
+    return Math.max(z - this.footRadius, this.stage.bottom);
   }
 
   groundHeights(t) {
@@ -256,16 +257,17 @@ class RobotScene {
   // Keeps sun, floor and (if wanted) camera with the robot.
   follow(t) {
     const { data, viewer } = this;
-    const [x, y] = data.interpolate(data.target, 2, 0, 2, t, this.scratch);
-    this.stage.moveTo(x, y);
+    const [x, y, z] = data.interpolate(data.target, 3, 0, 3, t, this.scratch);
+    this.stage.moveTo(x, y, z);
     if (this.lastTarget && this.shown.follow) {
-      const [dx, dy] = [x - this.lastTarget[0], y - this.lastTarget[1]];
+      const [dx, dy, dz] = [x, y, z].map((value, i) => value - this.lastTarget[i]);
       for (const point of [viewer.camera.position, viewer.controls.target]) {
         point.x += dx; // the viewer's own axes: x, z up becomes y, y becomes -z
         point.z -= dy;
+        point.y += dz;
       }
     }
-    this.lastTarget = [x, y];
+    this.lastTarget = [x, y, z];
   }
 
   setView(name) {
@@ -273,11 +275,11 @@ class RobotScene {
     const [a, e] = [azimuth * Math.PI / 180 + this.heading(), elevation * Math.PI / 180];
     const { camera, controls } = this.viewer;
     const room = Math.max(...this.ghosts.map((ghost) => ghost.shift[1])) / 2;
-    const [x, y] = [this.lastTarget[0], this.lastTarget[1] + room];
+    const [x, y, z] = [this.lastTarget[0], this.lastTarget[1] + room, this.lastTarget[2] + 0.22];
     const reach = (distance + room) * Math.max(1, 1.25 / camera.aspect);
-    controls.target.set(x, 0.22, -y);
+    controls.target.set(x, z, -y);
     camera.position.set(
-      x + reach * Math.cos(e) * Math.cos(a), 0.22 + reach * Math.sin(e),
+      x + reach * Math.cos(e) * Math.cos(a), z + reach * Math.sin(e),
       -(y + reach * Math.cos(e) * Math.sin(a)));
     controls.update();
     this.showThrough();

@@ -2,6 +2,7 @@
 // Light, floor and horizon around the robot.
 
 const FLOOR_TILE = 0.5; // m, edge of the floor texture's repeat: two by two tiles
+const UNKNOWN = -32768, LEAST_SPAN = 0.3, BELOW = 0.02; // mm of a cell that was not seen; m; m
 const IS_DARK = matchMedia("(prefers-color-scheme: dark)");
 IS_DARK.addEventListener("change", () => location.reload());
 
@@ -83,11 +84,48 @@ class Stage {
     this.viewer.set_object(["floor"], this.floor);
   }
 
+  // What the robot has seen of the ground, by height; the floor is then below all of it.
+  useGround(data) {
+    const { THREE } = MeshCat;
+    const geometry = new THREE.BufferGeometry();
+    this.bottom = 0;
+    if (data.ground) {
+      const { x, y, cell, shape: [n, k], heights, low, colors } = data.ground;
+      const high = heights.reduce((most, z) => Math.max(most, z), -Infinity) / 1000;
+      const span = Math.max(high - low, LEAST_SPAN);
+      const table = colors.map((color) => new THREE.Color(color));
+      const [points, tints, corners] = [[], [], []];
+      const isKnown = (cell) => heights[cell] !== UNKNOWN;
+      heights.forEach((height, i) => {
+        const z = height / 1000;
+        points.push(x + cell * Math.floor(i / k), y + cell * (i % k), z);
+        const at = Math.min(Math.max((z - (low + high) / 2) / span + 0.5, 0), 1) * (table.length - 1);
+        const first = Math.min(Math.floor(at), table.length - 2);
+        tints.push(...table[first].clone().lerp(table[first + 1], at - first).toArray());
+        const [ahead, left] = [i + k, i + 1];
+        if (left % k === 0 || ahead >= n * k) return;
+        for (const triangle of [[i, ahead, ahead + 1], [i, ahead + 1, left]]) {
+          if (triangle.every(isKnown)) corners.push(...triangle);
+        }
+      });
+      geometry.setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
+      geometry.setAttribute("color", new THREE.Float32BufferAttribute(tints, 3));
+      geometry.setIndex(corners);
+      geometry.computeVertexNormals();
+      this.bottom = Math.min(low, 0) - BELOW;
+    }
+    const shades = new THREE.Mesh(geometry, new THREE.MeshLambertMaterial({
+      vertexColors: true, polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 8,
+    }));
+    shades.receiveShadow = true;
+    this.viewer.set_object(["ground"], shades);
+  }
+
   // Keeps the sun over the robot and the floor below it.
-  moveTo(x, y) {
-    this.sunTarget.position.set(x, y, 0.1);
-    this.sun.position.set(x + 0.7, y - 1.0, 2.2);
+  moveTo(x, y, z) {
+    this.sunTarget.position.set(x, y, z + 0.1);
+    this.sun.position.set(x + 0.7, y - 1.0, z + 2.2);
     this.floor.position.set(
-      Math.round(x / FLOOR_TILE) * FLOOR_TILE, Math.round(y / FLOOR_TILE) * FLOOR_TILE, 0);
+      Math.round(x / FLOOR_TILE) * FLOOR_TILE, Math.round(y / FLOOR_TILE) * FLOOR_TILE, this.bottom);
   }
 }

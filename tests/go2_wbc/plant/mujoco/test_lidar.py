@@ -6,7 +6,7 @@ import pytest
 from go2_wbc.errors import ConfigError
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.base import Scan
-from go2_wbc.plant.mujoco.lidar import PLACE, LidarConfig
+from go2_wbc.plant.mujoco.lidar import PLACE, DepthConfig, LidarConfig
 from go2_wbc.plant.terrain import Blocks
 from go2_wbc.robot.state import JointCommand
 from tests.engine_helpers import standing_q
@@ -88,3 +88,25 @@ def test_what_happens_next_is_saved() -> None:
 def test_of_a_users_own_model_nobody_knows_what_is_ground(tmp_path: object) -> None:
     with pytest.raises(ConfigError, match="lidar is only for the built model"):
         MujocoPlant(f"{tmp_path}/own.xml", lidar=True)
+    with pytest.raises(ConfigError, match="depth is only for the built model"):
+        MujocoPlant(f"{tmp_path}/own.xml", depth=DepthConfig())
+    with pytest.raises(ConfigError, match="not with both"):
+        MujocoPlant(lidar=True, depth=True)
+
+
+def test_a_depth_camera_sees_the_ground_ahead_with_a_noise_that_grows_with_the_square() -> None:
+    exact, noisy = DepthConfig(noise=0.0, latency=0.0), DepthConfig(latency=0.0)
+    plants = [MujocoPlant(depth=config, seed=2) for config in (exact, noisy)]
+    scan, other = (standing(plant) for plant in plants)
+    R, p = plants[0].truth().R_world_base, plants[0].truth().p_world_base
+    points = scan.p_base_points @ R.T + p
+    np.testing.assert_allclose(points[:, 2], 0.0, atol=1e-9)
+    assert 0.2 < points[:, 0].min() - noisy.place[0] < 0.3  # 59 deg below the horizontal
+    far, off = (np.linalg.norm(s.p_base_points - noisy.place, axis=1) for s in (scan, other))
+    assert far.max() < noisy.farthest
+    off -= far
+    for low, high in ((0.3, 0.8), (1.5, 3.0)):
+        here = (far > low) & (far < high)
+        assert here.sum() > 100
+        assert np.std(off[here] / far[here] ** 2) == pytest.approx(noisy.noise, rel=0.15)
+    assert other.deviation == pytest.approx(np.sqrt(np.mean(off**2)), rel=0.2)
