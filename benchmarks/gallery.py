@@ -2,7 +2,8 @@
 
 Writes ``gallery.md`` and ``images/gallery/NAME.avif``, loops of the motions as they were measured:
 AVIF takes a quarter of a WebP that moves (Pillow 11.3 or later). With ``--film`` it writes
-``images/demo.webp`` instead: the README's film, the demo from the first steps on.
+``images/demo.webp`` instead: the README's film, the demo from the first steps on; and
+``images/sight.avif``, the same over its course by sight.
 """
 
 import argparse
@@ -13,10 +14,12 @@ import numpy as np
 from PIL import Image
 
 from controller.cli.common import ExitCode, Subparsers, add_parser
-from controller.demo import run_demo
+from controller.demo import DEMO_STEPS, run_demo
+from controller.demo.steps import TERRAINS, terrain_steps
 from controller.go2_controller import GO2Controller
 from go2_wbc.errors import ConfigError, MotionError
 from go2_wbc.files import checked_output, write_atomically
+from go2_wbc.plant import MujocoPlant
 from go2_wbc.recording import Recording
 from motions import Motion, Timeline, find_motion, motion_names
 from viz.render.animation import encoded_webp, frame_times
@@ -63,13 +66,18 @@ Every motion of the library, as it was measured in MuJoCo under `GO2Controller.p
 arrow is the normal force of a foot, 2 mm a newton. `go2-wbc list` prints the parameters,
 `go2-wbc run NAME --html FILE` writes a run as a page that can be turned in 3D. How to write such a
 motion: the [tutorial](tutorial.md).
+
+Over a course by sight, `go2-wbc demo --terrain course`: the ground is drawn as the robot's lidar
+has seen it ([how](how-to/worlds.md#by-sight)).
+
+![Stairs, a block, stepping stones and a gap](images/sight.avif)
 """
 
 
 EXAMPLES = """
 python -m benchmarks gallery docs              the page and all pictures
 python -m benchmarks gallery docs bow wave     the page and these pictures
-python -m benchmarks gallery docs --film         the film of the README
+python -m benchmarks gallery docs --film         the films of the README and of walking by sight
 """
 
 
@@ -83,13 +91,18 @@ def register(subparsers: Subparsers) -> None:
     )
     parser.add_argument("folder", metavar="FOLDER", type=Path, help="of the page")
     parser.add_argument("names", metavar="MOTION", nargs="*", help="default: all")
-    parser.add_argument("--film", action="store_true", help="write the README's film instead")
+    parser.add_argument(
+        "--film",
+        action="store_true",
+        help="write the two films of the demo instead",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the film, or the page and the pictures of the motions that were named."""
     if args.film:
         _write(args.folder / "images" / "demo.webp", film(from_first_step(demo())))
+        _write(args.folder / "images" / "sight.avif", loop(from_first_step(demo("course"))))
         return ExitCode.OK
     target = checked_output(args.folder / "gallery.md", (".md",))
     timelines = [find_motion(name)() for name in args.names or motion_names()]
@@ -168,14 +181,18 @@ def speed_of(length: float) -> float:
     return FAST if length >= LONG else 1.0
 
 
-def demo() -> Recording:
-    """A run of the demo.
+def demo(terrain: str | None = None) -> Recording:
+    """A run of the demo, or of that over a terrain by sight.
 
     Raises:
         MotionError: if it was not done.
     """
-    with GO2Controller() as go2:
-        if not run_demo(go2).ok:
+    plant, steps = None, DEMO_STEPS
+    if terrain is not None:
+        ground = TERRAINS[terrain]
+        plant, steps = MujocoPlant(terrain=ground, lidar=True, sensors="imu"), terrain_steps(ground)
+    with GO2Controller(plant=plant) as go2:
+        if not run_demo(go2, steps=steps).ok:
             raise MotionError("the demo was not done: no film of it")
         return go2.recording()
 

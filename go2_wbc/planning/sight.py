@@ -211,7 +211,7 @@ def way_ahead(m: HeightMap, x: float, y: float, way: V3, here: float) -> tuple[f
                 break
             for side in (-MOVED_ASIDE, MOVED_ASIDE):
                 other = beside(m, x, y, way, (ahead, line * LINE + side))
-                if not abs(z - last) < abs(other - last):
+                if np.isnan(z) or abs(other - last) < abs(z - last):
                     z = other
             if np.isnan(z):
                 continue

@@ -75,6 +75,7 @@ from go2_wbc.robot.rest_detection import (
     take_in_rest,
 )
 from go2_wbc.robot.sensor_watch import SensorWatch
+from go2_wbc.robot.speed_noise import noise_of_gyro
 from go2_wbc.robot.state import OdometryCovariance, RobotState, SensorReading
 from go2_wbc.robot.state_filter import (
     ERROR,
@@ -282,7 +283,7 @@ class StateEstimator:
         """Take in a reading that is newer than the last one; returns the state at its time."""
         if self.watch is not None:
             reading = self.watch.checked(reading, self._x.quaternion)
-            self._state.gyro_noise = self.watch.gyro_noise
+            self._state.gyro_noise = noise_of_gyro(self.watch.speed_noise)
             if (turn := self.watch.misturned) is not None:
                 self._turn_back(turn)
         step = reading.time - self._time

@@ -42,7 +42,7 @@ from go2_wbc.robot.imu_watch import (
 )
 from go2_wbc.robot.leg_kinematics import LegGeometry, Legs, leg_table
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.speed_noise import SpeedNoise, calm_gyro, calm_joints, noise_of_gyro
+from go2_wbc.robot.speed_noise import MOST_JOINTS, SpeedNoise, calm_gyro, calm_joints, noise_of_gyro
 from go2_wbc.robot.state import PartFault, SensorReading
 
 JUMP = 0.05
@@ -202,19 +202,23 @@ def watch_encoders(s: WatchedSensors, r: SensorReading, dt: float) -> None:
             others = max(others, s.same[k]) if k != j else others
         if s.same[j] > STUCK_TIME and others < DOUBT:
             s.stuck[j] = 1.0
-    mean = 0.5 * (r.v_joints + s.v)
-    off = r.q_joints - s.q - mean * dt
+    turned, square = np.empty(12), 0.0
     for j in range(12):
-        if abs(off[j]) > JUMP:
+        turned[j] = (r.q_joints[j] - s.q[j]) / dt
+        jump = r.q_joints[j] - s.q[j] - 0.5 * (r.v_joints[j] + s.v[j]) * dt
+        if abs(jump) <= JUMP:
+            square += min((jump / dt) ** 2, MOST_JOINTS**2) / 12.0
+        else:
+            turned[j] = r.v_joints[j]
             if s.whole > 1.0:
-                s.shift[j] += off[j]
+                s.shift[j] += jump
                 s.jumped[j] = 1.0 if abs(s.shift[j]) > 0.5 * JUMP else 0.0
-            off[j] = 0.0
         s.q[j], s.v[j] = r.q_joints[j], r.v_joints[j]
         r.q_joints[j] -= s.shift[j]
-    calm_joints(s.speed_noise, r, off, mean, dt)
-    s.dv[:] += gain * ((r.v_joints - s.speed_noise.v) / dt - s.dv)
-    s.speed_noise.v[:] = r.v_joints
+    calm_joints(s.speed_noise, r, turned, square, dt)
+    for j in range(12):
+        s.dv[j] += gain * ((r.v_joints[j] - s.speed_noise.v[j]) / dt - s.dv[j])
+        s.speed_noise.v[j] = r.v_joints[j]
 
 
 @subroutine
@@ -428,6 +432,7 @@ class SensorWatch:
 
     Attributes:
         faults: what is broken, in the order in which it was noticed.
+        speed_noise: of the joints' speeds and the gyro.
     """
 
     def __init__(self, model: RobotModel) -> None:
@@ -444,14 +449,10 @@ class SensorWatch:
         m = self._state.imu
         return m.turn.copy() if m.is_found else None
 
-    @property
-    def gyro_noise(self) -> float:
-        """Root mean square [rad/s] of the noise of a gyro that is noisy, else 0."""
-        return float(noise_of_gyro(self._state.speed_noise))
-
     def restart(self) -> None:
         """Forget everything: all parts are taken for sound."""
         self._state, self._time = WatchedSensors(), -np.inf
+        self.speed_noise = self._state.speed_noise
         self._flags = np.zeros(len(_PARTS))
         self.faults: tuple[PartFault, ...] = ()
 

@@ -59,18 +59,15 @@ def noise_of_gyro(s: SpeedNoise) -> float:
 
 
 @subroutine
-def calm_joints(s: SpeedNoise, r: SensorReading, off: Array12, mean: Array12, dt: float) -> None:
-    """Take the change of the angles for speeds that are noisy.
+def calm_joints(s: SpeedNoise, r: SensorReading, turned: Array12, square: float, dt: float) -> None:
+    """Take ``turned``, by what the angles have changed [rad/s], for speeds that are noisy.
 
-    ``off`` [rad] is how much they have changed beyond the ``mean`` speeds [rad/s] since the last
-    reading; 0 for a joint of which the angle is not to be believed.
+    ``square``: mean of those of e [rad^2/s^2].
     """
     s.count += 1.0
-    square = np.mean(np.minimum(off * off / (dt * dt), MOST_JOINTS**2))
     s.joints += share_of(s, dt) * (square - s.joints)
     if s.joints > NOISY_JOINTS**2:
-        for j in range(12):
-            r.v_joints[j] = mean[j] + off[j] / dt
+        r.v_joints[:] = turned
 
 
 @subroutine

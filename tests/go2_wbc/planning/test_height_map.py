@@ -107,7 +107,7 @@ def test_feet_move_the_map_and_write_what_is_not_known() -> None:
 )
 def test_what_a_lidar_sees_is_the_terrain(terrain: Terrain | None) -> None:
     plant = MujocoPlant(terrain=terrain, lidar=True, seed=6)
-    heights, lidar, rng = HeightMap(), plant._lidar, np.random.default_rng(0)
+    heights, lidar, rng = HeightMap(), plant._ranges, np.random.default_rng(0)
     assert lidar is not None
     for n in range(41):
         q = standing_q(float(rng.uniform(0.29, 0.31)))
