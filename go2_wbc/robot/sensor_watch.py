@@ -10,8 +10,7 @@ named, and put right where they tell what it should have been. The residuals:
     noise            of speeds and gyro: ``speed_noise``          what angles and time say
 
 with J and M of a leg alone, in the base frame. Forces are judged while the legs carry the robot. A
-reading that is not a number is taken for the one before. A healthy robot's readings leave as they
-came, to the bit.
+reading that is not a number is taken for the one before. Sound ones leave as they came, bit by bit.
 """
 
 from __future__ import annotations
