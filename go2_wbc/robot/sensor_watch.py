@@ -333,19 +333,17 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
     note_push(m, push, dt)
     is_up = up[2] > UPRIGHT
     is_borne = is_up and borne.sum() > CARRIED * c.weight
-    note_bearing(m, is_up and dot(moved, moved) < THROWN**2, is_borne, dt)
+    is_told = dot(moved, moved) < THROWN**2 and noise_of_gyro(s.speed_noise) == 0.0
+    note_bearing(m, is_up and is_told, is_borne, dt)
     for leg in range(4):
         watch_force(s, r, leg, borne[leg], slack[leg], is_borne, dt)
         stands = r.foot_forces[leg] > SENSED or borne[leg] - slack[leg] > LOADED
         bears = stands and borne[leg] > LOADED and is_sound(s, leg)
         s.stood[leg] = s.stood[leg] + dt if bears else 0.0
-        if max(borne[leg], r.foot_forces[leg]) > c.weight:
-            m.struck = STRUCK
+        m.struck = STRUCK if max(borne[leg], r.foot_forces[leg]) > c.weight else m.struck
         loads[leg] = borne[leg] if bears and m.unborne == 0.0 else 0.0
     m.is_found, m.turn[:] = 0.0, 0.0
-    is_shaken = bool(np.any((s.stood > 0.0) & (s.stood <= SHAKEN)))
-    if noise_of_gyro(s.speed_noise) == 0.0:
-        judge_jump(m, jump, is_shaken, dt)
+    judge_jump(m, jump, bool(np.any((s.stood > 0.0) & (s.stood <= SHAKEN))), dt)
     watch_imu(s, r, c, places, speeds, loads, up, dt)
 
 

@@ -57,6 +57,17 @@ def test_a_way_ends_in_front_of_what_is_too_high_too_deep_or_too_wide(
         assert end == pytest.approx(start, abs=0.06)
 
 
+@pytest.mark.parametrize("y", [-0.05, 0.0, 0.04, 0.1])
+def test_pits_that_are_hardly_seen_between_stones_do_not_end_a_way(y: float) -> None:
+    heights = exact_map(Stones(start=0.25), aside=0.6)
+    x = np.round((heights.name - 0.5) / 2.0**20) * 0.025
+    is_hidden = np.random.default_rng(0).random(x.shape) < 0.85
+    heights.name[(heights.height < -0.1) & (x > 0.35) & is_hidden] = 0.0
+    for yaw in (-0.063, 0.0, 0.063):
+        what, _ = way_ahead(heights, 0.0, y, (math.cos(yaw), math.sin(yaw), 0.9), 0.0)
+        assert what == 0.0
+
+
 def standing(height: float = 0.3) -> Snapshot:
     state = state_of(standing_q(height))
     state.feet_in_contact[:] = True
