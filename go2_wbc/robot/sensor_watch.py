@@ -404,8 +404,7 @@ def watch_sensors(
 ) -> int:
     """Judge a reading, ``dt`` seconds after the last one, and fill ``r`` with what it should be.
 
-    The first six are as in ``SensorReading``; ``quaternion`` (x y z w) is the orientation of the
-    base, as last known. Returns how many parts are broken.
+    ``quaternion`` (x y z w): of the base, as last known. Returns how many parts are broken.
     """
     r.gyro[:], r.accelerometer[:], r.tau[:] = gyro, accelerometer, tau
     r.q_joints[:], r.v_joints[:], r.foot_forces[:] = q_joints, v_joints, foot_forces
