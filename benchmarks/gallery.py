@@ -77,7 +77,7 @@ has seen it ([how](how-to/worlds.md#by-sight)).
 EXAMPLES = """
 python -m benchmarks gallery docs              the page and all pictures
 python -m benchmarks gallery docs bow wave     the page and these pictures
-python -m benchmarks gallery docs --film         the films of the README and of walking by sight
+python -m benchmarks gallery docs --film         the films of the pages
 """
 
 

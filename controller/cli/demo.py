@@ -116,7 +116,7 @@ def run(
         go2-wbc demo --viewer --realtime     watch it live in MuJoCo's window
         go2-wbc demo --friction 0.4 --mass-scale 1.2 --seed 3
         go2-wbc demo --backend placo --solver proxqp
-        go2-wbc demo --terrain course        stairs, a block, stones and a gap, by sight
+        go2-wbc demo --terrain course        stairs, a block, stones, a gap, by sight
         go2-wbc demo --ros2                  on the robot of `go2-wbc ros2 --realtime`
     """
     if elsewhere.namespace != Elsewhere().namespace and not elsewhere.ros2:
