@@ -17,6 +17,7 @@ import pickle
 import signal
 import sys
 import threading
+import time
 import traceback
 from abc import ABC, abstractmethod
 from collections import Counter, deque
@@ -204,6 +205,8 @@ def _end_with_parent() -> None:
 
 ATTEMPTS = 2
 """How often an item is tried whose worker dies: the first time it may have been anything."""
+DYING = 0.2
+"""Time [s] after which a server of processes that has been killed has ended, and another starts."""
 LOADED = ("controller.sweeps.motion_study",)
 """What the fork server loads: with it the robot, the simulator and the motions."""
 
@@ -282,7 +285,8 @@ class Worker:
         with its_end, _start():
             try:
                 self._process.start()
-            except (EOFError, OSError):  # the server of processes has just died: another one
+            except (EOFError, OSError):  # the server of processes is just dying
+                time.sleep(DYING)
                 self._process.start()
         self.handles = (self._pipe, self._process.sentinel)
 
