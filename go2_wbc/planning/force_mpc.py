@@ -24,7 +24,7 @@ from go2_wbc.planning.gait_clock import Clock
 from go2_wbc.planning.ground import ground_at, haste, is_rough, on_leash, tilt
 from go2_wbc.planning.mpc import INTERVAL, NODES, STEP, Horizon, solve_mpc
 from go2_wbc.planning.trunk import Command, advance_pose, pose_turn, ramp
-from go2_wbc.planning.walk import Planner, Walk
+from go2_wbc.planning.walk import Planner, Walk, carried_height
 from go2_wbc.reference import STANCE, Target
 from go2_wbc.robot.state import Snapshot
 
@@ -93,7 +93,7 @@ def fill_goals(s: Planner, c: Walk, command: Command) -> None:
         goals[k, 2], goals[k, 8] = yaw - s.trunk.yaw, velocity[2]
         goals[k, 3], goals[k, 4] = x, y
         goals[k, 0], goals[k, 1] = as_angle * b, -as_angle * a
-        goals[k, 5] = ground_at(s.ground, x, y) + c.height + s.sight.lift + s.ground.lift
+        goals[k, 5] = ground_at(s.ground, x, y) + carried_height(s, c)
         goals[k, 5] += s.trunk.height_offset
         goals[k, 11] = s.ground.slope[0] * goals[k, 9] + s.ground.slope[1] * goals[k, 10]
 

@@ -313,7 +313,7 @@ def haste(g: Ground, friction: float, delay: float, velocity: Array3) -> float:
     """Share of the greatest acceleration that the robot is given.
 
     By the ``friction`` and slope of the ground, by how late the commands act [s], and by the
-    ``velocity`` that it is told, in the heading frame.
+    ``velocity`` that it is told, in the heading frame [m/s].
     """
     share = min(level_friction(g, friction, LEAST_FRICTION) / HASTE_FRICTION, 1.0) ** 2
     late = min(max((delay - PROMPT) / (LATE - PROMPT), 0.0), 1.0)

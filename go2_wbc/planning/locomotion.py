@@ -145,8 +145,6 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
     else:
         rest_in_place(now, s, config.position_leash, dt)
     carry_ground(s.ground, config.rough, now, dt)
-    if s.sight.sees:
-        s.ground.rise_way = 0.0
     expect_steps(s.ground, config.rough, now, world_velocity(trunk), dt)
     correct_height(trunk, now, s.ground.height + carried_height(s, c), dt)
 

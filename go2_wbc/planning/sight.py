@@ -50,9 +50,6 @@ FLIGHT, FLIGHT_STEP = 3, 0.13
 LOWERED, LIFT, LIFT_RATE = 0.15, 0.045, 0.1
 """Fall of the way, per metre, from which on it leads down; by how much [m] the trunk is higher on
 it, and how fast [m/s] it comes there."""
-HIGH_STEP, MORE_LIFT = 0.19, 0.02
-"""Height [m] of a step above which the trunk is higher, going down, by as much more, and the most
-[m]: calves pass over 20 cm; for 18 cm the legs stand better a little bent."""
 GREATEST_STEP, GREATEST_GAP = 0.24, 0.38
 """Height [m] of a step and length [m] of a hole that the robot does not try."""
 EVEN, FOOT_CELLS = 0.04, 3
@@ -257,11 +254,10 @@ def look(
     g.height += share * (plane[0] - g.height)
     g.slope[0] += share * (plane[1] - g.slope[0])
     g.slope[1] += share * (plane[2] - g.slope[1])
-    g.roughness, g.rough_way, g.high_way = mean, 0.0, 0.0
+    g.roughness, g.rough_way, g.high_way, g.rise_way = mean, 0.0, 0.0, 0.0
     climb = g.slope[0] * way[0] + g.slope[1] * way[1]
     g.steeper = 1.0 - FOLLOW if climb > 0.0 else 0.0
-    more = min(max(highest - HIGH_STEP, 0.0), MORE_LIFT)
-    lift = LIFT + more if climb < -LOWERED and sight.uneven_way > 0.0 else 0.0
+    lift = LIFT if climb < -LOWERED and sight.uneven_way > 0.0 else 0.0
     sight.lift += min(max(lift - sight.lift, -LIFT_RATE * dt), LIFT_RATE * dt)
     sight.blocked, sight.end = way_ahead(m, x, y, way, plane[0])
     is_near = sight.blocked != 0.0 and sight.end < STOP + NEAR_STOP

@@ -189,3 +189,10 @@ def distance_to_edge(terrain: Terrain, place: np.ndarray) -> float:
     level = true_heights(terrain, place[None, :2])[0]
     off = np.abs(x[np.abs(z - level) > 0.03])
     return float(off.min()) if len(off) else math.inf
+
+
+def test_who_sees_expects_no_steps_from_what_its_feet_have_met() -> None:
+    walking = planner(exact_map(None))
+    walking._state.ground.rise_way = 0.5
+    walking.update(standing(), VelocityCommand(0.3))
+    assert walking._state.ground.rise_way == 0.0
