@@ -33,7 +33,8 @@ from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.ground import MOST_FRICTION
 from go2_wbc.planning.locomotion import LEAST_HEIGHT, LocomotionConfig
-from go2_wbc.reference import Reference
+from go2_wbc.reference import SWING, Reference, Target
+from go2_wbc.records import Array4x3
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.state import Snapshot
@@ -74,6 +75,10 @@ asked of it: 250 N that it did not give, and the legs in the air were swung for 
 would have turned. Of 120 pushes by 14 % more than 36 N s aside and 45 back 20 were not held or held
 too late, now 1."""
 
+LIFTED, STIFFNESS, DAMPING = 0.02, 1200.0, 1.0
+"""Height [m] by which a foot rises over the others if something lifts it, and by what it then
+returns to its place besides what swinging feet do [1/s^2], and share of its speed."""
+
 
 class Standing(ChangePosture):
     """Go to the standing posture, hold it, and step for balance where that cannot be held."""
@@ -105,6 +110,7 @@ class Standing(ChangePosture):
         )
         self._friction_of_steps = MOST_FRICTION if friction is None else friction
         self._steps: Walking | None = None
+        self._places: Array4x3 | None = None
 
     @property
     def is_stepping(self) -> bool:
@@ -119,7 +125,7 @@ class Standing(ChangePosture):
     def update(self, snapshot: Snapshot) -> Reference:
         """The posture's reference, or that of the steps."""
         if self._steps is not None and self._steps.is_finished(snapshot):
-            self._steps = None
+            self._steps = self._places = None
             self.start(snapshot)
         if self._steps is None and not self.may_lie:
             offset = self._capture_offset(snapshot)
@@ -127,11 +133,29 @@ class Standing(ChangePosture):
                 gait, friction = trot_against(snapshot, offset), self._friction_of_steps
                 self._steps = Walking(self._model, gait, self._config, friction)
                 self._steps.start(snapshot)
-        return super().update(snapshot) if self._steps is None else _walk_on(self._steps, snapshot)
+        if self._steps is not None:
+            return _walk_on(self._steps, snapshot)
+        reference = super().update(snapshot)
+        self._press_back(snapshot, Target.of(reference.row))
+        return reference
 
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether the posture is reached, with no step left to do."""
         return not self.is_stepping and super().is_finished(snapshot)
+
+    def _press_back(self, snapshot: Snapshot, target: Target) -> None:
+        """Let feet that something lifts press towards their places, as legs in the air."""
+        feet = snapshot.p_world_feet
+        if self._places is None or self.may_lie:
+            self._places = None if self.may_lie else feet.copy()
+            return
+        rise = feet[:, 2] - self._places[:, 2]
+        is_lifted = rise - np.median(rise) > LIFTED
+        if is_lifted.any():
+            target.legs[is_lifted] = SWING
+            target.p_world_feet[:] = self._places
+            target.v_world_feet[:] = -DAMPING * snapshot.v_world_feet
+            target.a_world_feet[:] = STIFFNESS * (self._places - feet)
 
     def _capture_offset(self, snapshot: Snapshot) -> tuple[float, float]:
         """Place [m] of the capture point in the world, from the feet's middle."""
