@@ -338,7 +338,8 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
     for leg in range(4):
         watch_force(s, r, leg, borne[leg], slack[leg], is_borne, dt)
         stands = r.foot_forces[leg] > SENSED or borne[leg] - slack[leg] > LOADED
-        bears = stands and borne[leg] > LOADED and is_sound(s, leg)
+        is_felt = r.foot_forces[leg] > UNFELT  # one that is lifted presses, and moves
+        bears = is_felt and stands and borne[leg] > LOADED and is_sound(s, leg)
         s.stood[leg] = s.stood[leg] + dt if bears else 0.0
         m.struck = STRUCK if max(borne[leg], r.foot_forces[leg]) > c.weight else m.struck
         loads[leg] = borne[leg] if bears and m.unborne == 0.0 else 0.0
