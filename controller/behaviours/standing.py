@@ -157,7 +157,8 @@ class Standing(ChangePosture):
             self._places = None if self.may_lie else feet.copy()
             return np.zeros(4, dtype=bool)
         rise = feet[:, 2] - self._places[:, 2]
-        return rise - np.median(rise) > LIFTED
+        rise -= np.median(rise)
+        return (rise > LIFTED) & (rise == rise.max())
 
     def _press_back(
         self, snapshot: Snapshot, is_lifted: Bool[np.ndarray, "4"], target: Target
