@@ -66,13 +66,13 @@ UPWARDS, UPWARDS_LASTS = 0.85, 0.1
 """Share of it by which it points up or down, and how long [s] it lasts then: feet slide sideways,
 and a trot that believes it rises falls soon. Of sound ones 0.05 at most."""
 STRUCK = 0.3
-"""Time [s] after a foot has borne more than the robot's weight, in which an error that begins has to
+"""Time [s] after a foot has borne more than the robot's weight: an error that begins then has to
 last as long as any other: where commands act late, and on waves, robots land so hard, their feet
 spring back, and 2 sound ones of 20 were named in reversals."""
 PUSHED = 0.6
 """Share of it by which the legs push the robot sideways, as they do if all feet slide together:
-what the accelerometer feels then is true. An error tilts the attitude that is believed, and what
-then seems to push sideways is the weight; but the legs lack the whole error of what is felt."""
+what the accelerometer feels then is true. An error makes the robot lean, and its weight then pushes
+as well; but the legs lack the whole error of what is felt."""
 
 TILTED, TILT_LASTS, TILT_SHARE = 2.0, 0.1, 0.7
 """Once the gyro has erred, an error of the accelerometer is a tilt that it has left: taken back
