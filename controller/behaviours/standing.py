@@ -76,8 +76,9 @@ would have turned. Of 120 pushes by 14 % more than 36 N s aside and 45 back 20 w
 too late, now 1."""
 
 SETTLING = 0.5
-"""Time constant [s] by which the posture follows the feet's heights: where a trot ends two bear all
-and are pressed in, and an estimated height drifts. With 6 kg it stood up to 12 mm too low."""
+"""Time constant [s] by which the posture of a robot with a load follows the feet's heights: where a
+trot ends two bear all and are pressed in, and an estimated height drifts. With 6 kg it stood up to
+12 mm too low."""
 LIFTED, STIFFNESS, DAMPING = 0.02, 1200.0, 1.0
 """Height [m] by which a foot rises over the others if something lifts it, and by what it then
 returns to its place besides what swinging feet do [1/s^2], and share of its speed."""
@@ -139,7 +140,7 @@ class Standing(ChangePosture):
         if self._steps is not None:
             return _walk_on(self._steps, snapshot)
         is_lifted = self._lifted(snapshot)
-        if not (self.may_lie or is_lifted.any()):
+        if snapshot.payload[0] > 0.0 and not (self.may_lie or is_lifted.any()):
             self._tracker.follow_ground(snapshot, (snapshot.state.time - self._last) / SETTLING)
         reference = super().update(snapshot)
         if is_lifted.any():
