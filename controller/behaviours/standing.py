@@ -11,6 +11,10 @@ first stride has a flight, as those of a fast trot; in the others the feet stand
 a trot ahead, since every flight costs height, of which a robot that goes aside at that speed has
 none to lose. Once it has come to rest the robot stands where it is.
 
+A foot that something lifts is no contact: it swings towards its place, and what the leg gives for
+that is its reaction on the trunk, as the QP has it, whether the foot moves or what lifts it holds
+it. So it is pressed back by what it is lifted with, and stands again once it is let go.
+
 A push does not wait until the ground has shown its friction: unless a walk has found it slippery,
 the steps count on as much as any walk does.
 """
