@@ -136,6 +136,12 @@ class PlanTracker:
         follow(snapshot, t, dt, *steps, self._state, target)
         return Reference.of_row(target.row)
 
+    def follow_ground(self, snapshot: Snapshot, share: float) -> None:
+        """Move the plan by this share of the way to the mean height of the feet."""
+        p_world = self._state.landing.anchor.p_world
+        height = float(snapshot.p_world_feet[:, 2].mean()) - snapshot.foot_radius
+        p_world[2] += share * (height - p_world[2])
+
     @property
     def anchor(self) -> Anchor:
         """Where the plan is now: landings move it."""
