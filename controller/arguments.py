@@ -12,8 +12,7 @@ from go2_wbc.plant.base import Plant
 from go2_wbc.robot.profile import GO2
 
 NAMESPACE = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
-LONGEST = 1e6
-"""Time [s] of one call: 11 days."""
+LONGEST = 1e6  #: Time [s] of one call: 11 days
 
 
 def require_pace(plant: Plant | None, *, realtime: bool) -> None:

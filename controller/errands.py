@@ -16,10 +16,8 @@ from enum import Enum
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar, final
 
-POLL = 0.05
-"""Time [s] after which a waiting thread looks whether the loop still runs."""
-FLUSH_LIMIT = 0.5
-"""Time [s] in which the last log lines are written."""
+POLL = 0.05  #: Time [s] after which a waiting thread looks whether the loop still runs
+FLUSH_LIMIT = 0.5  #: Time [s] in which the last log lines are written
 
 Result = TypeVar("Result")
 

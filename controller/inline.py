@@ -22,8 +22,7 @@ from viz.render.margin_plot import margin_figure
 from viz.replay.html_page import replay_html
 from viz.style import png_of
 
-HEIGHT = 620
-"""Of a page [px]."""
+HEIGHT = 620  #: Of a page [px]
 LONGEST = 60.0
 """Motions and recordings that last longer [s] are not drawn unasked: the page would be large."""
 

@@ -40,8 +40,7 @@ from go2_wbc.wbc.relaxation import is_grave
 
 _log = logging.getLogger(__name__)
 
-OLDEST_SCAN = 64
-"""Ticks by which a scan may be late."""
+OLDEST_SCAN = 64  #: Ticks by which a scan may be late
 
 
 @dataclass(frozen=True, slots=True)

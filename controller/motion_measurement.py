@@ -28,8 +28,7 @@ from motions.dynamics.phases import PhaseProblem
 from motions.feasibility.goal_errors import misses_of
 from motions.plan.compiled_plan import CompiledPlan, DynamicSpan
 
-STRIDE = 5
-"""Every fifth tick is compared with what was written."""
+STRIDE = 5  #: Every fifth tick is compared with what was written
 LANDED = 0.1
 """Time [s] after a touchdown at which the place of a foot counts: it has its load by then."""
 
@@ -143,10 +142,8 @@ def _landings(asked: PhaseProblem) -> Bool[np.ndarray, "k 4"]:
     return ~stands & np.vstack([stands[1:], stands[-1:]])
 
 
-HALF_LENGTH = 0.2
-"""Distance [m] from the trunk's middle to its ends: what a wrong attitude moves."""
-FULL = 0.999
-"""Share of a torque limit from which on a motor gives all it has."""
+HALF_LENGTH = 0.2  #: Distance [m] from the trunk's middle to its ends: what a wrong attitude moves
+FULL = 0.999  #: Share of a torque limit from which on a motor gives all it has
 SETTLED_CONTACT = 0.1
 """Time [s] after a touchdown, and before a lift-off, in which an unloaded foot may skid."""
 
@@ -315,12 +312,10 @@ OFF_TRUNK, OFF_TURN, OFF_PAW, OFF_LANDING = 0.030, math.radians(8.0), 0.030, 0.0
 SOLVED_OFF, SOLVED_LANDING = 0.050, 0.040
 """The same where a part is solved: the tolerance that a timeline gives by itself, and how near its
 place a jump must land."""
-SLIP = 0.010
-"""Distance [m] that a standing foot may slide."""
+SLIP = 0.010  #: Distance [m] that a standing foot may slide
 MOMENT = 0.010
 """Time [s] for which motors may be saturated, joints on a stop, and what must not touch touch."""
-BEYOND = 0.02
-"""Angle [rad] by which a joint may be past its limit."""
+BEYOND = 0.02  #: Angle [rad] by which a joint may be past its limit
 
 
 def failures_of(run: MotionMeasurement, plan: MotionPlan) -> tuple[str, ...]:

@@ -11,12 +11,9 @@ from go2_wbc.planning.command import VelocityCommand, finite_number
 from go2_wbc.robot.rotations import wrap_angle
 from go2_wbc.robot.state import RobotState
 
-TURN_RATE = 1.0
-"""Greatest turning rate [rad/s] of a goal."""
-WALK_SPEED = 0.4
-"""Greatest speed [m/s] of a goal."""
-APPROACH = 2.0
-"""Speed per remaining way [1/s]: the robot slows down before its goal."""
+TURN_RATE = 1.0  #: Greatest turning rate [rad/s] of a goal
+WALK_SPEED = 0.4  #: Greatest speed [m/s] of a goal
+APPROACH = 2.0  #: Speed per remaining way [1/s]: the robot slows down before its goal
 HEADING_TOLERANCE = math.radians(1.5)
 DISTANCE_TOLERANCE = 0.02
 GREATEST_TURN = 2 * math.pi

@@ -10,12 +10,10 @@ from typing import final
 SWITCH_INTERVAL = 0.0005
 """Time [s] for which one thread may keep the interpreter to itself: a quarter of a control period
 instead of Python's two and a half, so that other work does not hold up the control loop."""
-NAP = 0.001
-"""Longest sleep [s] between two calls of ``meanwhile``."""
+NAP = 0.001  #: Longest sleep [s] between two calls of ``meanwhile``
 REASON = "%s"
 """Format of the log line that says why something ended; ``go2-wbc`` prints outcomes itself."""
-LOG_PERIOD = 5.0
-"""Least time [s] between two warnings of one kind."""
+LOG_PERIOD = 5.0  #: Least time [s] between two warnings of one kind
 
 
 @final

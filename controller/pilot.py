@@ -42,10 +42,8 @@ from go2_wbc.planning.trunk import LEVEL, BodyPose
 from go2_wbc.plant import Plant
 from motions.postures import lie_down, rise, sit_down, sit_raise
 
-READY_TIME = 0.2
-"""Time [s] that a robot is given to stand ready in walking mode."""
-HOLD_TIME = 0.4
-"""Time [s] in which a robot that stands takes the exact posture."""
+READY_TIME = 0.2  #: Time [s] that a robot is given to stand ready in walking mode
+HOLD_TIME = 0.4  #: Time [s] in which a robot that stands takes the exact posture
 LOOK_TIME = 0.03
 """Time [s] for which a limp robot's feet are looked at: one that stands sinks by 3 mm."""
 

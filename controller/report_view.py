@@ -22,12 +22,9 @@ from motions.feasibility import Series
 from motions.plan.trajectory import as_written
 from viz.content import CENTRE_OF_MASS, Annotation, MarginCurve, ReplayContent, Slider, Verdict
 
-AFTERWARDS = "afterwards"
-"""Label of what is shown of a run after its motion."""
-_AFTERWARDS = 1.0
-"""How long [s] a run is shown after the end of its motion."""
-_TOGETHER = 0.05
-"""Annotations on one limit that are this close in time [s] become one."""
+AFTERWARDS = "afterwards"  #: Label of what is shown of a run after its motion
+_AFTERWARDS = 1.0  #: How long [s] a run is shown after the end of its motion
+_TOGETHER = 0.05  #: Annotations on one limit that are this close in time [s] become one
 _LEAST_SAMPLES = 2
 _MOVED, _TURNED = 0.02, np.radians(2.0)
 """A motion that ends farther from its start, [m] and [rad], moves on."""

@@ -40,19 +40,14 @@ GREATEST_LAG = 0.1
 """Lag [s] behind the wall clock after which the pace is given up and taken up anew."""
 LEAST_PAUSE = 1e-4
 """Least pause [s] between two ticks, in which other threads get hold of the interpreter."""
-POLL = 0.001
-"""Time [s] after which a thread that interrupts another one's call looks again."""
-SETTLE_LIMIT = 3.0
-"""Time [s] in which a posture must come to rest after its motion."""
-STEPS_LIMIT = 4.0
-"""Time [s] in which steps for balance must come to rest."""
-CALM_TIME = 0.1
-"""Time [s] for which a posture must hold without a break."""
+POLL = 0.001  #: Time [s] after which a thread that interrupts another one's call looks again
+SETTLE_LIMIT = 3.0  #: Time [s] in which a posture must come to rest after its motion
+STEPS_LIMIT = 4.0  #: Time [s] in which steps for balance must come to rest
+CALM_TIME = 0.1  #: Time [s] for which a posture must hold without a break
 REST_TIME = 0.3
 """The same [s] of rest after a walk: for half of that a trunk that the last step has left 15 mm off
 its height is slow while it turns round, and then moves on at 0.02 to 0.03 m/s."""
-ROUNDING = 1e-9
-"""Time [s] by which a sum of control periods may miss its end."""
+ROUNDING = 1e-9  #: Time [s] by which a sum of control periods may miss its end
 SINK_TIME = 1.0
 """Time [s] for which a robot that went limp on its feet is watched: it sinks, or it falls."""
 HANG_LIMIT = 2.0

@@ -24,8 +24,7 @@ DEAD_ZONE = 0.12
 """Share of a stick's way around its middle that counts as none (own choice: worn sticks)."""
 AHEAD, ASIDE, TURNING = 1.0, 0.4, 1.5
 """Speeds [m/s] and turning rate [rad/s] of a stick that is pushed to its end."""
-LEFT_X, LEFT_Y, RIGHT_X = 0, 1, 3
-"""Axes of the sticks; right and down are positive."""
+LEFT_X, LEFT_Y, RIGHT_X = 0, 1, 3  #: Axes of the sticks; right and down are positive
 BUTTONS: Mapping[int, str] = {0: "4", 1: " ", 2: "1", 3: "h", 4: "2", 5: "b", 6: "k", 7: "r"}
 """The key that each button stands for: A, B, X, Y, left and right shoulder, back, start."""
 LEGEND = (
@@ -119,14 +118,10 @@ def find_gamepad() -> tuple[Gamepad | None, str]:
     return None, "no gamepad is plugged in: keys only"
 
 
-SPEED_STEP = 0.1
-"""Change of speed [m/s] by one key."""
-TURN_STEP = 0.2
-"""Change of the turning rate [rad/s] by one key."""
-WIDTH = 79
-"""Columns of the state line at most."""
-JOIN_TIME = 5.0
-"""Time [s] that a running call gets to end when the robot is let go."""
+SPEED_STEP = 0.1  #: Change of speed [m/s] by one key
+TURN_STEP = 0.2  #: Change of the turning rate [rad/s] by one key
+WIDTH = 79  #: Columns of the state line at most
+JOIN_TIME = 5.0  #: Time [s] that a running call gets to end when the robot is let go
 
 QUIT, STOP, DAMP = "x", " ", "k"
 STEPS: Mapping[str, tuple[str, VelocityCommand]] = {

@@ -13,8 +13,7 @@ from go2_wbc.planning.envelopes import AUTO, LADDER, GaitChoice, envelope_of
 from go2_wbc.planning.trunk import LEVEL, BodyPose
 from go2_wbc.robot.state import Snapshot
 
-STOP_LIMIT = 4.0
-"""Time [s] in which a walking robot must come to rest after ``stop``."""
+STOP_LIMIT = 4.0  #: Time [s] in which a walking robot must come to rest after ``stop``
 CHANGE_SHARE = 0.65
 """Share of both envelopes in which one gait passes over into another: at their edge it fell."""
 

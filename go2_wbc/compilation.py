@@ -77,8 +77,7 @@ MODULES = (
     "go2_wbc.wbc.trajectory_loads",
 )
 """Modules that hold kernels."""
-_PROBED = 8
-"""Of so many kernels one is looked for, to see whether many are missing."""
+_PROBED = 8  #: Of so many kernels one is looked for, to see whether many are missing
 
 
 class Routine(Written):

@@ -37,8 +37,7 @@ def signature_of(routine: Written) -> Any:
     return _type_of(given, where)(*arguments)
 
 
-_callees: dict[int, Any] = {}
-"""Numba refers to what it compiled weakly: kept here, by the routine."""
+_callees: dict[int, Any] = {}  #: Numba refers to what it compiled weakly: kept here, by the routine
 
 
 def as_callee(routine: Written) -> Any:

@@ -22,8 +22,7 @@ class Posture(Enum):
     STAND = "stand"
 
 
-Stance = Posture
-"""The former name of ``Posture``, kept for scripts that use it."""
+Stance = Posture  #: The former name of ``Posture``, kept for scripts that use it
 
 
 @dataclass(frozen=True, slots=True)

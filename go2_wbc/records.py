@@ -39,8 +39,7 @@ T = TypeVar("T")
 
 V3 = tuple[float, float, float]
 """A vector as three numbers, which compiled code keeps in registers."""
-Array3 = Float[np.ndarray, "3"]
-"""A vector in memory; so are the others, by their shapes."""
+Array3 = Float[np.ndarray, "3"]  #: A vector in memory; so are the others, by their shapes
 Array4 = Float[np.ndarray, "4"]
 Array6 = Float[np.ndarray, "6"]
 Array12 = Float[np.ndarray, "12"]

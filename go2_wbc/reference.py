@@ -25,8 +25,7 @@ from go2_wbc.records import Array4, Array12, Record
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.state import Snapshot
 
-LEAST_WEIGHT, MOST_WEIGHT = 1e-6, 1e2
-"""Of the force regularisation: beyond them accuracy is lost."""
+LEAST_WEIGHT, MOST_WEIGHT = 1e-6, 1e2  #: Of the force regularisation: beyond them accuracy is lost
 _set = object.__setattr__  # of a frozen value that is being made
 
 

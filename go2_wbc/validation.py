@@ -37,8 +37,7 @@ class Rule:
     holds: Callable[[float], bool]
 
 
-LARGEST = 1e9
-"""No number of a robot of 15 kg is larger, in SI units: more is a slip of the pen."""
+LARGEST = 1e9  #: No number of a robot of 15 kg is larger, in SI units: more is a slip of the pen
 POSITIVE = Rule("positive", lambda value: value > 0.0)
 NOT_NEGATIVE = Rule("at least 0", lambda value: value >= 0.0)
 FINITE = Rule("finite", lambda _: True)

@@ -24,10 +24,8 @@ NORMAL_FORCE_MAX = 400.0
 """Greatest normal force [N]: 2.5 times the robot's weight, never active in slow motions."""
 LEAST_REACH = 0.03
 """Least reach [m] of a sitting robot's rear legs in their planes; 0.05 on feet below the hips."""
-MOST_RAISED = 0.012
-"""Most that narrow feet raise a sit [m], inside of ``checks.HEIGHT_TOLERANCE``."""
-SETTLING_STEPS = 10
-"""Steps that put the CoM of a standing robot in its place; see ``place``."""
+MOST_RAISED = 0.012  #: Most that narrow feet raise a sit [m], inside of ``checks.HEIGHT_TOLERANCE``
+SETTLING_STEPS = 10  #: Steps that put the CoM of a standing robot in its place; see ``place``
 
 
 def __getattr__(name: str) -> Float[np.ndarray, "6"]:

@@ -16,8 +16,7 @@ from go2_wbc.brief import brief
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
 
-CENTRE_OF_MASS = "com"
-"""Stands in ``Annotation.parts`` for the centre of mass."""
+CENTRE_OF_MASS = "com"  #: Stands in ``Annotation.parts`` for the centre of mass
 _LEAST_SAMPLES = 2
 
 

@@ -10,10 +10,8 @@ from go2_wbc.curves import Curve
 from go2_wbc.reference import JointReference
 from go2_wbc.robot.state import Snapshot
 
-DAMPING = 3.0
-"""Joint damping [N m s/rad] of the safe state: the robot sinks in about a second."""
-SERVO_DAMPING = 2.0
-"""That of a servo [N m s/rad]."""
+DAMPING = 3.0  #: Joint damping [N m s/rad] of the safe state: the robot sinks in about a second
+SERVO_DAMPING = 2.0  #: That of a servo [N m s/rad]
 
 
 class _OnTheGround(Behaviour):

@@ -168,8 +168,7 @@ def _pairs(plan: MotionPlan) -> list[list[Leg]]:
     return pairs
 
 
-LOW = 0.15
-"""Height [m] of the trunk over the ground below which a posture may begin on the belly."""
+LOW = 0.15  #: Height [m] of the trunk over the ground below which a posture may begin on the belly
 RISEN = 0.22
 """Height [m] of the tracked point over the ground from which on the robot has left its belly."""
 SUNK_BACK = 0.04

@@ -18,14 +18,11 @@ from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.recording import true_runs
 from go2_wbc.reference import Reference
 
-TURNING = 0.3
-"""Time [s] in which the plan's clock comes to a stop."""
+TURNING = 0.3  #: Time [s] in which the plan's clock comes to a stop
 STEP = 0.05
 """Time [s] between the instants that are looked at; a foot is loaded for longer than that."""
-ARRIVED = 1e-3
-"""Distance [s] from the safe instant at which the clock stands."""
-_BRAKING = 0.8
-"""Share of the clock's deceleration that the approach counts on."""
+ARRIVED = 1e-3  #: Distance [s] from the safe instant at which the clock stands
+_BRAKING = 0.8  #: Share of the clock's deceleration that the approach counts on
 ROOM = TURNING / (2.0 * _BRAKING)
 """Time [s] of the plan that passes while the clock comes to a stop."""
 PATIENCE = 1.0

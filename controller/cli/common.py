@@ -33,8 +33,7 @@ else:  # argparse's class takes no subscript at run time
 """What a subcommand's ``register`` adds its parser to."""
 
 
-PROGRAM = "go2-wbc"
-"""The name of the command line, and of the package."""
+PROGRAM = "go2-wbc"  #: The name of the command line, and of the package
 
 
 class ExitCode(IntEnum):
@@ -99,8 +98,7 @@ def installed_version(distribution: str) -> str | None:
         return None
 
 
-WIDTH = 78
-"""Columns of a help text: those of ``argparse`` in a terminal of 80."""
+WIDTH = 78  #: Columns of a help text: those of ``argparse`` in a terminal of 80
 T = TypeVar("T")
 
 

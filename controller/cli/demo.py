@@ -296,8 +296,7 @@ def _longest_mode(recording: Recording, rows: Int[np.ndarray, " k"], feet: int) 
 WIDTH = 80
 _HEADER = f"     {'step':<21}{'time':>7}  {'figure':<23}{'asked':>9}{'measured':>9}"
 _INDENT = " " * 5
-_DECIMALS = {"deg": 1}
-"""Decimals of a unit's numbers; 3 for any other."""
+_DECIMALS = {"deg": 1}  #: Decimals of a unit's numbers; 3 for any other
 
 
 def render(report: DemoReport, encoding: str | None = None) -> str:

@@ -48,10 +48,8 @@ if TYPE_CHECKING:
     from go2_wbc.world import World
     from motions import CheckedMotion
 
-TELL_EVERY = 50
-"""Ticks between two looks at the progress line."""
-GETTING_READY = 2.5
-"""About how long [s] the robot takes to stand up before the motion."""
+TELL_EVERY = 50  #: Ticks between two looks at the progress line
+GETTING_READY = 2.5  #: About how long [s] the robot takes to stand up before the motion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

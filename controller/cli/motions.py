@@ -37,8 +37,7 @@ if TYPE_CHECKING:
     from motions.plan.trajectory import Trajectory
 
 WIDTH = 80
-ARRAYS = ("q", "v", "a", "rpy", "p_com", "stance")
-"""What an npz file holds beside the time."""
+ARRAYS = ("q", "v", "a", "rpy", "p_com", "stance")  #: What an npz file holds beside the time
 STARTER = '''"""{title}: a motion for the Go2.
 
     go2-wbc check {name}.py      can the robot do it?

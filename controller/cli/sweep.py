@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from go2_wbc.world import World
     from motions import CompiledPlan, Timeline
 
-LINES = 20
-"""How often progress is told where no line can be rewritten."""
+LINES = 20  #: How often progress is told where no line can be rewritten
 WHAT = """a motion: name of the library, FILE.py[:NAME], FILE.json, FILE.plan;
 gait:NAME[@VX[,VY[,WZ]]]; push:IMPULSE[@SPEED] (N s, m/s); or a
 function (seed) -> row: FILE.py:NAME, MODULE:NAME"""

@@ -23,10 +23,8 @@ from controller.modes import Mode
 from go2_wbc.errors import ClosedError, Go2WbcError, PlantError
 from go2_wbc.recording import Recording
 
-MEASUREMENT_RATE = 100.0
-"""Samples a second from which the measurements of a step are taken."""
-TOTALS_RATE = 500.0
-"""Samples a second for the least margins and loads: short dips count."""
+MEASUREMENT_RATE = 100.0  #: Samples a second from which the measurements of a step are taken
+TOTALS_RATE = 500.0  #: Samples a second for the least margins and loads: short dips count
 
 
 @dataclass(frozen=True, slots=True)

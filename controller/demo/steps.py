@@ -142,23 +142,16 @@ def _without_nan(value: object) -> object:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-FORWARD_SPEED = 0.2
-"""Speed [m/s] of the walk."""
-FORWARD_TIME = 2.0
-"""Duration [s] of the walk."""
+FORWARD_SPEED = 0.2  #: Speed [m/s] of the walk
+FORWARD_TIME = 2.0  #: Duration [s] of the walk
 SPEED_UP_TIME = 0.5
 """Time [s] at the start of the walk that does not count for its mean speed; the ramp takes 0.13 s
 and the first stride 0.36 s."""
-SPEED_TOLERANCE = 0.02
-"""Accepted error [m/s] of the mean speed: a tenth of what is asked."""
-STOP_TIME = 1.0
-"""Time [s] that the robot gets to come to rest."""
-TURN_ANGLE = math.pi / 2
-"""Angle [rad] of the turn, to the left."""
-WAY_TOLERANCE = 0.1
-"""Accepted error [m] of the way over a terrain, by the robot's own estimate."""
-HOLD_TIME = 2.0
-"""Time [s] for which the paw is held up."""
+SPEED_TOLERANCE = 0.02  #: Accepted error [m/s] of the mean speed: a tenth of what is asked
+STOP_TIME = 1.0  #: Time [s] that the robot gets to come to rest
+TURN_ANGLE = math.pi / 2  #: Angle [rad] of the turn, to the left
+WAY_TOLERANCE = 0.1  #: Accepted error [m] of the way over a terrain, by the robot's own estimate
+HOLD_TIME = 2.0  #: Time [s] for which the paw is held up
 
 
 @dataclass(frozen=True, slots=True)
@@ -299,8 +292,7 @@ TERRAINS: Mapping[str, Terrain] = {
     ),
 }
 """What a robot that sees can be shown on, by name."""
-BEHIND = 0.6
-"""How far [m] behind the end of a terrain its way ends."""
+BEHIND = 0.6  #: How far [m] behind the end of a terrain its way ends
 
 
 def terrain_steps(terrain: Terrain) -> tuple[DemoStep, ...]:

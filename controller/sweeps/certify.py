@@ -30,10 +30,8 @@ if TYPE_CHECKING:
     from viz.content import CertifiedRate, ReplayContent
 
 RUNS = 200
-WORST = 5
-"""How many of the worst runs are named."""
-FEWEST = 20
-"""Runs before which nothing ends early."""
+WORST = 5  #: How many of the worst runs are named
+FEWEST = 20  #: Runs before which nothing ends early
 _HOLDS_FOR = ("version", "code", "plan", "libraries", "python")
 """What a page names of a certificate's ``about``, besides its world."""
 

@@ -28,12 +28,10 @@ from go2_wbc.extras import install_line
 ATTEMPTS = 4
 """How often an item is tried whose process or machine dies: it takes a moment until a machine is
 missed, and it may be given the same item once more."""
-QUEUED = 2
-"""Items in the hands of the cluster for each of its processors: none waits for the next."""
+QUEUED = 2  #: Items in the hands of the cluster for each of its processors: none waits for the next
 QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_NUM_REDIS_GET_RETRIES": "3"}
 """Ray tells nobody of its use, and does not look for minutes for a cluster that does not answer."""
-PATIENCE = 10.0
-"""Time [s] in which something must listen at the address of a cluster."""
+PATIENCE = 10.0  #: Time [s] in which something must listen at the address of a cluster
 ON_LOOPBACK = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
 """Ray on this machine only listens on 127.0.0.1, as it does elsewhere than on Linux by default. Its
 argument for the address does not: it replaces 127.0.0.1 by one that others reach."""

@@ -18,12 +18,10 @@ DRAWN = ("friction", "mass_scale", "joint_friction", "angle", "phase")
 """Columns of our own studies that a seed varies (``trials``, ``studies``, ``motion_study``)."""
 CLOSEST = "closest_share"
 """Column of a motion's sweep: how much of its closest limit a run took; the rest is its margin."""
-MOST_VALUES = 12
-"""A parameter with more values than these is cut into bins."""
+MOST_VALUES = 12  #: A parameter with more values than these is cut into bins
 PER_BIN, MOST_BINS = 12, 8
 """Runs of a bin at least, where there are enough of them, and bins along a line at most."""
-PER_CELL, MOST_CELLS = 8, 6
-"""The same of a grid, along each side."""
+PER_CELL, MOST_CELLS = 8, 6  #: The same of a grid, along each side
 
 
 def relations(rows: Sequence[Row], columns: Columns, over: Sequence[str] = ()) -> list[Relation]:

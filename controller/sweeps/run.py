@@ -17,8 +17,7 @@ from go2_wbc.arguments import typed
 from go2_wbc.brief import brief, inline_html
 from go2_wbc.errors import CommandError, SweepError, unknown_name
 
-FOLDER = Path("out/sweeps")
-"""Where rows are kept if nothing else is said."""
+FOLDER = Path("out/sweeps")  #: Where rows are kept if nothing else is said
 ENGINES = ("local", "ray")
 
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from controller.sweeps.sweep_file import Columns, Row
 
-CONFIDENCE = 0.95
-"""How sure an interval is to hold the true rate or mean."""
+CONFIDENCE = 0.95  #: How sure an interval is to hold the true rate or mean
 PERCENTILES = (5.0, 50.0, 95.0)
 
 

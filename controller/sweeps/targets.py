@@ -26,11 +26,9 @@ if TYPE_CHECKING:
 
 
 ROOT = Path(__file__).resolve().parents[2]
-SOURCES = ("go2_wbc", "motions", "controller")
-"""Packages whose code decides what a run gives."""
+SOURCES = ("go2_wbc", "motions", "controller")  #: Packages whose code decides what a run gives
 LIBRARIES = ("mujoco", "pin", "placo", "proxsuite", "numpy")
-_SHOWN = 12
-"""Digits of a digest that are kept."""
+_SHOWN = 12  #: Digits of a digest that are kept
 
 
 def digest(content: bytes) -> str:
@@ -61,8 +59,7 @@ FORMS = (
     "gait:NAME[@VX[,VY[,WZ]]], push:IMPULSE[@SPEED], or a function (seed) -> row as "
     "FILE.py:NAME or MODULE:NAME"
 )
-SPEED = 0.5
-"""Speed [m/s] of a gait or a pushed robot of which nothing is said."""
+SPEED = 0.5  #: Speed [m/s] of a gait or a pushed robot of which nothing is said
 
 
 @dataclass(frozen=True, slots=True)

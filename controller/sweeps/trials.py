@@ -32,8 +32,7 @@ FRICTION_RANGE = (0.5, 1.0)
 NOMINAL_FRICTION = 0.8
 MASS_RANGE = (0.9, 1.1)
 """Factor on every mass and inertia of the robot; the controller is not told."""
-YAW_RANGE = (-math.pi, math.pi)
-"""Heading [rad] at the start."""
+YAW_RANGE = (-math.pi, math.pi)  #: Heading [rad] at the start
 JOINT_NOISE = 0.05
 """Standard deviation [rad] of the joint angles from which the robot sinks to the ground."""
 
@@ -147,14 +146,10 @@ class TrialRobot:
 
 START_TIME = 1.5
 """Time [s] after a command that is left out: the ramp takes 0.7 s, settling the rest."""
-WINDOW = 5.0
-"""Time [s] over which the velocity is compared with the command."""
-PUSH_TIME = 0.1
-"""Duration [s] of a push."""
-RECOVERY_TIME = 2.0
-"""Time [s] after a push until the robot is looked at."""
-_STREAM = 1
-"""Keeps the numbers of a push apart from those of the robot and its world."""
+WINDOW = 5.0  #: Time [s] over which the velocity is compared with the command
+PUSH_TIME = 0.1  #: Duration [s] of a push
+RECOVERY_TIME = 2.0  #: Time [s] after a push until the robot is looked at
+_STREAM = 1  #: Keeps the numbers of a push apart from those of the robot and its world
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,12 +33,10 @@ MESSAGES = (
 )
 """What each outcome of ``solve_qp`` says."""
 
-VIOLATION = 1e-10
-"""Violation, relative to 1 + |bound|, below which a row counts as met."""
+VIOLATION = 1e-10  #: Violation, relative to 1 + |bound|, below which a row counts as met
 DEPENDENT = 1e-18
 """Squared share of a normal outside the working set's span below which it counts as inside."""
-MAX_STEPS = 400
-"""Rows taken in or dropped. 44 rows needed 40 at most (own measurement)."""
+MAX_STEPS = 400  #: Rows taken in or dropped. 44 rows needed 40 at most (own measurement)
 
 
 class WorkingSet(NamedTuple):

@@ -6,10 +6,8 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
-HALF_WIDTH = 5.0
-"""Half width [m] of stairs, ramps and patches."""
-PLATFORM = 10.0
-"""Length [m] of the level ground behind the last step."""
+HALF_WIDTH = 5.0  #: Half width [m] of stairs, ramps and patches
+PLATFORM = 10.0  #: Length [m] of the level ground behind the last step
 
 
 @dataclass(frozen=True, slots=True)

@@ -105,8 +105,7 @@ class SensorNoise:
         return turned / np.linalg.norm(turned)
 
 
-NONE = SensorNoise(*[0.0] * 8)
-"""The truth."""
+NONE = SensorNoise(*[0.0] * 8)  #: The truth
 
 
 @dataclass(frozen=True, slots=True)

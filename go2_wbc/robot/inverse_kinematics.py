@@ -37,8 +37,7 @@ POSTURE_WEIGHT, DAMPING = 1e-4, 1e-6
 the QP of a step definite at singularities."""
 MAX_STEP, CONVERGED_STEP = 0.3, 1e-7
 """Longest change [rad or m] of a coordinate in one step, and that below which it has converged."""
-MAX_ITERATIONS = 200
-"""Of each of the two phases."""
+MAX_ITERATIONS = 200  #: Of each of the two phases
 POSITION_TOLERANCE, ANGLE_TOLERANCE, CONSTRAINT_TOLERANCE = 1e-4, 1e-3, 1e-5
 """Largest error [m] of a foot or of the height, [rad] of the orientation and of a raised leg's
 joints, and violation [m, rad] of CoM margin and joint limits."""

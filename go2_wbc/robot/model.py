@@ -31,8 +31,7 @@ LEG_AXES = ("JointModelRX", "JointModelRY", "JointModelRY")
 FINGERPRINT_DECIMALS = 9
 """Decimals of the numbers [SI units] that count: what a file was computed for stays the same robot
 if another Pinocchio rounds its last digits differently."""
-FINGERPRINT = 16
-"""Letters of a fingerprint."""
+FINGERPRINT = 16  #: Letters of a fingerprint
 
 
 class RobotModel:

@@ -29,5 +29,4 @@ class Payload:
         return pin.Inertia(self.mass, np.array(self.place), np.zeros((3, 3)))
 
 
-NO_PAYLOAD = Payload()
-"""The robot carries nothing."""
+NO_PAYLOAD = Payload()  #: The robot carries nothing

@@ -41,8 +41,7 @@ from go2_wbc.validation import FINITE, POSITIVE, SHARE, between, ranged, require
 
 PERIOD = 0.02
 """Time [s] from one change of the belief to the next: much less than its response takes."""
-NOTHING = 0.02
-"""Mass [kg] at which a belief that fades has ended."""
+NOTHING = 0.02  #: Mass [kg] at which a belief that fades has ended
 
 
 @typed()

@@ -19,8 +19,7 @@ from go2_wbc.brief import brief
 from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.records import V3, Array6, Array12, ArrayNx3
 
-GO2 = "go2"
-"""Name of the robot where none is given."""
+GO2 = "go2"  #: Name of the robot where none is given
 FOLDER = Path(__file__).with_name("profiles")
 SPLAY = 0.3
 """Angle [rad] of hips that put the feet beside them, so that the folded legs carry nothing."""

@@ -42,8 +42,7 @@ Inertia = tuple[float, float, float, float, float, float]
 Body = tuple[float, V3, Inertia]
 LegBodies = tuple[float, float, V3, V3, V3, V3, Body, Body, Body]
 """Cosine and sine of the hip's angle, places and bodies: see ``place_leg``."""
-Wrench = tuple[V3, V3]
-"""Force and moment."""
+Wrench = tuple[V3, V3]  #: Force and moment
 _ZERO = (0.0, 0.0, 0.0)
 
 

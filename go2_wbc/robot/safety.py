@@ -22,8 +22,7 @@ from go2_wbc.robot.profile import RobotProfile, find_profile
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.validation import POSITIVE, ranged
 
-TOUCH = 0.01
-"""Height [m] of the trunk's lowest point over the ground below which it touches."""
+TOUCH = 0.01  #: Height [m] of the trunk's lowest point over the ground below which it touches
 ASTRAY_TOUCH = 0.025
 """The same [m] for a trunk that is not where it shall be: feet press into the ground in a fall, and
 an attitude that is off by a degree puts the nose off by 5 mm."""
@@ -31,8 +30,7 @@ STRIKE = 0.05
 """Time [s] of a touch from which on it counts until the trunk is back. With 0.03 two of sixteen
 trots counted as fallen that a push of 50 N s ahead let touch the ground, and that trotted on."""
 
-UNIT_TOLERANCE = 0.01
-"""How far the norm of a measured quaternion may be from 1."""
+UNIT_TOLERANCE = 0.01  #: How far the norm of a measured quaternion may be from 1
 
 
 @kernel

@@ -21,8 +21,7 @@ from go2_wbc.contacts import TIE
 from go2_wbc.records import packed
 from go2_wbc.reference import STANCE, Target
 
-CURVES = 30
-"""How many curves a plan has."""
+CURVES = 30  #: How many curves a plan has
 JOINTS_FROM, FEET_FROM = 6, 18
 """The first curve of the joints, and of the feet; those of the body come before."""
 

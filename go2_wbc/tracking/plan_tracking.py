@@ -45,8 +45,7 @@ from go2_wbc.robot.state import Snapshot
 from go2_wbc.tracking.landing import Landing, Landings, land
 from go2_wbc.tracking.plan_curves import StanceLoad
 
-PAIR = 2
-"""Feet that hold a trunk along the line between them, and not across it."""
+PAIR = 2  #: Feet that hold a trunk along the line between them, and not across it
 HEIGHT_PER_WEIGHT = 0.00055
 """Correction [m/N] that a payload's weight takes; this and the next two as found with 2 to 6 kg, up
 to 15 cm beside the middle."""
@@ -310,8 +309,7 @@ def tracked_position(snapshot: Snapshot, point: TrackedPoint) -> Array3:
     return snapshot.p_world_com if point is TrackedPoint.COM else snapshot.state.p_world_base
 
 
-MOST_FEET = 2
-"""Standing feet up to which the feedback is the plan's; more can give any moment."""
+MOST_FEET = 2  #: Standing feet up to which the feedback is the plan's; more can give any moment
 
 
 def fed_back(

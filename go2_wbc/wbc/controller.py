@@ -45,8 +45,7 @@ from go2_wbc.wbc.tasks import BuiltInTasks, Task
 
 GREATEST_EXTRA_WEIGHT = 1e4
 """Weight of a user's own task beyond which nothing is left of the others' accuracy."""
-BACKENDS = ("condensed", "full", "placo")
-"""Names of the back ends, the usual one first."""
+BACKENDS = ("condensed", "full", "placo")  #: Names of the back ends, the usual one first
 _IN_BODY = frozenset(BodyTarget.__dataclass_fields__)
 _IN_STATE = ("q", "v")
 _Z, _TAU, _MOTORS = (layout_of(Decision).slice(part) for part in ("z", "tau", "tau_motors"))

@@ -28,8 +28,7 @@ from go2_wbc.robot.state import Snapshot
 
 ACCELERATION = slice(0, 18)
 """a in z: m/s^2 and rad/s^2 of the base in its own frame, then rad/s^2 of the joints."""
-FORCES = slice(18, 30)
-"""f in z: N in the world frame, foot by foot."""
+FORCES = slice(18, 30)  #: f in z: N in the world frame, foot by foot
 SIZE = 30
 T = TypeVar("T")
 

@@ -28,8 +28,7 @@ from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 
 STANCE_WEIGHT = 100.0
 """Weight of the stance feet's rows against the tasks', the greatest of which is 10 by default."""
-SLACK_WEIGHT = 1.0
-"""Weight of the joint limits' slack."""
+SLACK_WEIGHT = 1.0  #: Weight of the joint limits' slack
 
 LIMITS = {"stance feet": 30.0, "joint limits": 400.0}
 """Violations [m/s^2, rad/s^2] beyond which a relaxed answer is no answer to what was asked.

@@ -73,15 +73,12 @@ QPSOLVERS_OPTIONS: dict[str, dict[str, Any]] = {
 }
 """Solvers reached through qpsolvers, with the tolerances that make their torques agree."""
 
-SOLVERS: tuple[str, ...] = ("active_set", "daqp", "proxqp", "quadprog")
-"""Valid solver names."""
+SOLVERS: tuple[str, ...] = ("active_set", "daqp", "proxqp", "quadprog")  #: Valid solver names
 
 PROXQP_EPS = 1e-9
 """Greatest residual of the optimality conditions, absolute, in the units of the rows."""
-PROXQP_EPS_INFEASIBLE = 1e-12
-"""Residual of a certificate of infeasibility; the default is 1e-4."""
-PROXQP_INFINITY = 1e20
-"""What ProxQP takes for an open side."""
+PROXQP_EPS_INFEASIBLE = 1e-12  #: Residual of a certificate of infeasibility; the default is 1e-4
+PROXQP_INFINITY = 1e20  #: What ProxQP takes for an open side
 PROXQP_MAX_ITERATIONS = 50
 """Outer, and inner per outer. 3 000 solvable problems needed at most 12 outer and 38 inner in all,
 solved again and again, except twice, not repeatable: 322 inner, and no solution after 1903.

@@ -28,16 +28,14 @@ from go2_wbc.wbc.config import Gains, WbcConfig
 from go2_wbc.wbc.loads import plan_loads
 from go2_wbc.wbc.problem import SIZE, Rows, Source
 
-LARGEST_ERROR = 3.0
-"""Orientation error [rad] beyond which its sine says little about it."""
+LARGEST_ERROR = 3.0  #: Orientation error [rad] beyond which its sine says little about it
 NO_ROTATION = 0.01
 """How far sine^2 + cosine^2 of a matrix's angle may be from 1, which they are for a rotation."""
 UNKNOWNS = 12
 """Three for each leg: the force of a foot that stands, else the accelerations of its joints."""
 TASK_ROWS = 18
 """Of all built-in tasks: three each for the trunk's place, its attitude, and for every leg."""
-LEG_ROWS = 6
-"""The first row of the first leg."""
+LEG_ROWS = 6  #: The first row of the first leg
 
 
 class Task(Source, ABC):

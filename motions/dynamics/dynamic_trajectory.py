@@ -26,8 +26,7 @@ from go2_wbc.errors import MotionError
 from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.robot.model import RobotModel
 
-FORMAT = 1
-"""Version of the files; others are refused."""
+FORMAT = 1  #: Version of the files; others are refused
 BALANCING_FEET = 2
 """On so many feet or fewer the plan's own gains are worth keeping: on more, the whole-body
 controller balances by itself."""

@@ -21,22 +21,18 @@ from motions.dynamics.phases import ALL_FEET, GRAVITY, KNOT_PERIOD, Phase, whole
 FOOTPRINT = np.array([[0.1934, 0.142], [0.1934, -0.142], [-0.1934, 0.142], [-0.1934, -0.142]])
 """Where the feet stand [m] around their middle, ahead and to the left: below the hips."""
 REAR_FEET, FRONT_FEET = frozenset({Leg.RL, Leg.RR}), frozenset({Leg.FL, Leg.FR})
-CROUCH, LEAN = -0.06, -0.02
-"""Heights of the trunk [m] from which it jumps and rears."""
+CROUCH, LEAN = -0.06, -0.02  #: Heights of the trunk [m] from which it jumps and rears
 GATHER, PUSH, LAND, RECOVER = 0.30, 0.20, 0.20, 0.30
 """Times [s] for crouching, pushing off, taking the landing, and rising to stand."""
-LEAN_BACK = 0.40
-"""Time [s] in which the weight goes to the rear feet before rearing."""
+LEAN_BACK = 0.40  #: Time [s] in which the weight goes to the rear feet before rearing
 PENDULUM_TIME = 0.175
 """sqrt(h / g) [s] of a CoM 0.30 m above its feet, as which a trunk on two feet tips."""
-REAR_RISE = 0.03
-"""By how much [m] the trunk's middle rises when rearing."""
+REAR_RISE = 0.03  #: By how much [m] the trunk's middle rises when rearing
 FARTHEST = {"x": 1.0, "y": 0.6, "yaw": math.pi, "height": 0.40}
 """Beyond these a jump is refused unsolved [m, rad]; nearer ones may still have no plan."""
 LONGEST_FLIGHT = 1.0
 """Time [s] in the air beyond which a jump is refused unsolved: twice that of the highest."""
-LOWEST = 0.02
-"""Least height [m] of a jump's feet: less is a step."""
+LOWEST = 0.02  #: Least height [m] of a jump's feet: less is a step
 _HERE = (0.0, 0.0, 0.0)
 _HOME = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 

@@ -23,8 +23,7 @@ from motions.arguments import is_number, positive
 
 BODY_COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 ALL_FEET = frozenset(LEGS)
-GRAVITY = 9.81
-"""[m/s^2]"""
+GRAVITY = 9.81  #: [m/s^2]
 KNOT_PERIOD = 0.02
 """Time [s] between knots, nearly: phases last whole numbers of them. Half of it costs two to four
 times the work, and the plans are no better (own experiments)."""

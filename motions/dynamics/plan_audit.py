@@ -17,8 +17,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, ranged
 from motions.dynamics.dynamic_trajectory import DynamicTrajectory, feet_at
 
-SOFT = 0.1
-"""Share of the costs with which a start begins; see ``Weights.softened``."""
+SOFT = 0.1  #: Share of the costs with which a start begins; see ``Weights.softened``
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,20 +140,13 @@ class Reading:
         )
 
 
-DEFECT = 1e-3
-"""What is left of the equations of motion [N, N m], at most."""
-FRICTION = 0.55
-"""Tangential over normal force."""
-PULL = 1.0
-"""Of the ground [N]."""
-PENETRATION = 0.005
-"""Of a foot in the air into the ground [m]."""
-SLIP = 0.02
-"""Of a standing foot, from where it touched down [m]."""
-TOUCHDOWN = 1.0
-"""Speed of a foot [m/s]."""
-ROTATION = 0.2
-"""Difference [rad] between the integrated rate and the change of attitude."""
+DEFECT = 1e-3  #: What is left of the equations of motion [N, N m], at most
+FRICTION = 0.55  #: Tangential over normal force
+PULL = 1.0  #: Of the ground [N]
+PENETRATION = 0.005  #: Of a foot in the air into the ground [m]
+SLIP = 0.02  #: Of a standing foot, from where it touched down [m]
+TOUCHDOWN = 1.0  #: Speed of a foot [m/s]
+ROTATION = 0.2  #: Difference [rad] between the integrated rate and the change of attitude
 
 
 def audit(plan: DynamicTrajectory, model: RobotModel) -> tuple[Reading, ...]:

@@ -26,13 +26,11 @@ TRACKING = (300.0, 100.0, 1000.0)
 not get easier with less in every case (own experiments)."""
 POSTURE = 3.0
 """Weight of the legs' angles [1/rad^2], by which feet in the air follow what was written."""
-LATEST = 0.2
-"""Greatest lag [s] that is looked for."""
+LATEST = 0.2  #: Greatest lag [s] that is looked for
 EXPLAINED = 0.8
 """Share of the squared deviation that a lag must leave less than, to be one: a trunk that sways
 where none was written is not late by anything. Own choice."""
-LAG_STEP = 0.005
-"""Between two lags [s] that are compared."""
+LAG_STEP = 0.005  #: Between two lags [s] that are compared
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,20 +18,17 @@ from motions.dynamics.knots import Knots, Solution
 from motions.dynamics.phases import Progress
 from motions.dynamics.shooting_problem import ShootingProblem
 
-ITERATIONS = 120
-"""Of one start; what converges does so in fewer (own experiments)."""
+ITERATIONS = 120  #: Of one start; what converges does so in fewer (own experiments)
 REGULARISATIONS = (1e-2, 1e-1, 1e-3)
 """First regularisations, in the order in which they are tried (own experiments)."""
 SOFT_STOP, STOP = 1e-2, 1e-3
 """Expected improvement of the cost below which a softened and a full program are done."""
-LINE_ROUNDS = 4
-"""Rounds in which torque bounds and speeds are made to agree."""
+LINE_ROUNDS = 4  #: Rounds in which torque bounds and speeds are made to agree
 AGREED = 1.05
 """Torque over what the plan may use at its speeds with which it is done: 0.89 of what the motors
 give in the middle of a step, all of it at its end (``PlanLimits``). Exact agreement takes many
 rounds."""
-FIRST_ANSWER = 0.45
-"""Processor time [s] of a search after which it says what binds so far."""
+FIRST_ANSWER = 0.45  #: Processor time [s] of a search after which it says what binds so far
 _JOINT_RATES = slice(19 + 6, None)
 _log = logging.getLogger(__name__)
 

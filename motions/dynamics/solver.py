@@ -20,10 +20,8 @@ from motions.dynamics.knots import Knots, Solution, feet_at, knots_of, pose_of
 from motions.dynamics.phases import PhaseProblem, Progress, Tolerance
 from motions.dynamics.plan_audit import PlanLimits, Weights, audit
 
-BUDGET = 20.0
-"""Processor time [s] that solving may take."""
-SAME = 1e-9
-"""Time [s] by which rounding may put a knot before its phase."""
+BUDGET = 20.0  #: Processor time [s] that solving may take
+SAME = 1e-9  #: Time [s] by which rounding may put a knot before its phase
 ANOTHER_TURN = 1.5 * math.pi
 """Angle [rad] about an axis of the trunk from which on what is left of a turn is a whole one that
 was lost: attitudes look the same, and the axes tip by much less than the rest."""

@@ -48,8 +48,7 @@ STRIDE = 4
 """Every fourth sample is looked at, 25 a second: at 1 m/s a link moves 4 cm between two of them."""
 SLACK = 1e-4
 """What a distance [m] may be wrong: GJK and EPA stop within 1e-6 of it, relative or in metres."""
-TRUNK_JOINT = 1
-"""Pinocchio's number of the base; those of hip, thigh and calf of every leg follow."""
+TRUNK_JOINT = 1  #: Pinocchio's number of the base; those of hip, thigh and calf of every leg follow
 PARTS = ("hip", "thigh", "calf")
 FAR = 0.05
 """Height [m] of a link's box above which its hull is not looked at: far from every limit."""

@@ -37,8 +37,7 @@ from motions.plan.trajectory import Trajectory, trajectory_of
 from motions.registry import load_motion
 from motions.saved.plan_file import is_saved_plan, load_plan
 
-BALANCE, WAY = "balance", "way of a foot"
-"""Problems of the compiler."""
+BALANCE, WAY = "balance", "way of a foot"  #: Problems of the compiler
 SLIDING = 0.17
 """Share of the slip that is allowed, from which on a force that lacks for a moment matters."""
 

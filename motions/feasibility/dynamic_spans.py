@@ -30,22 +30,15 @@ from motions.plan.trajectory import Trajectory
 
 _ROWS = (*(f"trunk {axis}" for axis in ("x", "y", "z", "roll", "pitch", "yaw")), *JOINTS)
 _Columns = Float[np.ndarray, "n k"]
-NEAR = 0.8
-"""Share of a tolerance from which on a warning is due: own choice."""
-STEP = 1e-3
-"""Greatest difference [m, rad] of a state from where the speeds lead."""
-DEFECT = 0.5
-"""Greatest remainder [N, N m] of the equations of motion: 0.3 % of the weight."""
-CURVE = 0.03
-"""Greatest distance [m, rad] of the curves that are played from the states."""
-PULL = 1.0
-"""Greatest force [N] that a foot would need without ground."""
+NEAR = 0.8  #: Share of a tolerance from which on a warning is due: own choice
+STEP = 1e-3  #: Greatest difference [m, rad] of a state from where the speeds lead
+DEFECT = 0.5  #: Greatest remainder [N, N m] of the equations of motion: 0.3 % of the weight
+CURVE = 0.03  #: Greatest distance [m, rad] of the curves that are played from the states
+PULL = 1.0  #: Greatest force [N] that a foot would need without ground
 FRICTION_SHARE = 1.1
 """What solved plans may use of the floor's friction: they are solved for 0.5, and reach 0.55."""
-SLIP = 0.02
-"""Distance [m] that a standing foot may move, and be off the ground."""
-TOUCHDOWN = 1.0
-"""Greatest speed [m/s] of a foot that comes down."""
+SLIP = 0.02  #: Distance [m] that a standing foot may move, and be off the ground
+TOUCHDOWN = 1.0  #: Greatest speed [m/s] of a foot that comes down
 SETTLING = 0.3
 """Time [s] on three feet or four in which the trunk comes to its plan, before there are two."""
 FEW_FEET = 0.7

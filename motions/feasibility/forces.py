@@ -78,13 +78,11 @@ PYRAMID = WbcConfig().friction
 DRY, VISCOUS, CREEP = 0.2, 0.1, 0.1
 """Friction of a joint: N m, N m s/rad, and the speed [rad/s] below which the dry part is less. As
 the simulated robot has it (``plant.mujoco.model.JointDynamics``)."""
-LOADED = 0.999
-"""Share of its load from which on a foot counts as standing fully: 1, less rounding."""
+LOADED = 0.999  #: Share of its load from which on a foot counts as standing fully: 1, less rounding
 PRESSED = 10.0
 """Normal force [N] from which on the friction of a foot matters; below, the quotient is noise and
 a slip moves nothing (own choice, 6 % of the weight)."""
-STILL = 1e-6
-"""Joint speed [rad/s] below which a motor drives nothing: more than rounding, 1e-15."""
+STILL = 1e-6  #: Joint speed [rad/s] below which a motor drives nothing: more than rounding, 1e-15
 NO_SUPPORT = 1.0
 """How far outside [m] of their support CoM and zero-moment point count when no foot stands."""
 _FEW = (2, 3)
@@ -92,10 +90,8 @@ TRUNK = ("trunk", "trunk turning")
 TIGHT_TORQUE, TIGHT_LOAD, TIGHT_FRICTION = 0.1, 10.0, 0.05
 """Margins below which a warning is due: share of the smallest torque limit, N and 1; own choice,
 about what separates a plan from its run in simulation."""
-TIGHT_SUPPORT, TIGHT_SLIP = 0.01, 0.003
-"""The same [m]."""
-FACETS = 16
-"""Of the cone."""
+TIGHT_SUPPORT, TIGHT_SLIP = 0.01, 0.003  #: The same [m]
+FACETS = 16  #: Of the cone
 NEAR_LIMIT = 0.8
 """Share of the limit up to which the controller's own share of the load is looked at, no better."""
 MOST_FRICTION = 1.5

@@ -31,8 +31,7 @@ LOW, FAST = 0.004, 0.45
 """Height [m] above its place at which a foot may meet the ground, as trunks lag by that, and speed
 [m/s] along it from which on it stays there: feet of 0.5 and 1.6 m/s with 19 mm to go landed 18 and
 more beside their places, 8 that had 15 to 44 mm to go at up to 0.4 m/s came to them."""
-PAIR = 2
-"""Standing feet over which a trunk can fall to its side."""
+PAIR = 2  #: Standing feet over which a trunk can fall to its side
 TIGHT_ANGLE, TIGHT_SPEED = 0.03, 0.1
 """Margins below which a warning is due: rad, and share of the least speed limit; own choice."""
 

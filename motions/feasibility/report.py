@@ -120,16 +120,13 @@ def logistic(x: float) -> float:
     return 0.5 * (1.0 + math.tanh(0.5 * x))
 
 
-NOISE = 1e-6
-"""A value below this is nothing but rounding, and is shown as 0."""
-SURE = 0.99
-"""A chance above this, or below 1 - this, is not told more exactly."""
+NOISE = 1e-6  #: A value below this is nothing but rounding, and is shown as 0
+SURE = 0.99  #: A chance above this, or below 1 - this, is not told more exactly
 SUMS = ("slip",)
 """Checks whose values add up: what was too much stays so, but is wrong only while it grows."""
 GROWTH = 5e-5
 """By how much [m] at least from one sample to the next: less is the creep of any movement."""
-STAYS = 1e-3
-"""m, rad; a motion that ends nearer than this to where it starts does not go anywhere."""
+STAYS = 1e-3  #: m, rad; a motion that ends nearer than this to where it starts does not go anywhere
 
 
 @dataclass(frozen=True, slots=True)

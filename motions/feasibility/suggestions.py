@@ -25,8 +25,7 @@ from motions.language.timeline import Timeline
 
 _log = logging.getLogger(__name__)
 _ReportOf = Callable[[Timeline], FeasibilityReport | None]
-AIM = 0.9
-"""Least chance of what is suggested."""
+AIM = 0.9  #: Least chance of what is suggested
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,12 +100,9 @@ class _Kind:
         return line
 
 
-_RISE = (5, 10, 15, 20, 30, 40, 60, 80)
-"""mm; own choice: the trunk stands 0.29 m high."""
-_SHARES = (2, 5, 10, 15, 20, 30, 40, 50, 60, 70, 80, 90)
-"""Per cent."""
-_LONGER = (2, 5, 10, 20, 30, 40, 50, 75, 100, 150, 200, 300)
-"""Per cent."""
+_RISE = (5, 10, 15, 20, 30, 40, 60, 80)  #: mm; own choice: the trunk stands 0.29 m high
+_SHARES = (2, 5, 10, 15, 20, 30, 40, 50, 60, 70, 80, 90)  #: Per cent
+_LONGER = (2, 5, 10, 20, 30, 40, 50, 75, 100, 150, 200, 300)  #: Per cent
 
 
 def _longer(steps: int) -> float:

@@ -42,14 +42,11 @@ from motions.feasibility.forces import (
 from motions.feasibility.report import Series
 from motions.plan.trajectory import Trajectory
 
-TRIPOD = 3
-"""Standing feet, with one raised."""
+TRIPOD = 3  #: Standing feet, with one raised
 LOWEST, FALLEN = 0.1, 0.3
 """Least height [m] of a CoM, and a distance [m] from which on it has fallen."""
-EVERY = 5
-"""Samples between those at which the inertia is computed; it changes slowly."""
-RCOND = 0.05
-"""Of a leg's Jacobian: a leg that is nearly stretched turns no faster than this says."""
+EVERY = 5  #: Samples between those at which the inertia is computed; it changes slowly
+RCOND = 0.05  #: Of a leg's Jacobian: a leg that is nearly stretched turns no faster than this says
 
 
 def tracking(case: Case) -> Series:

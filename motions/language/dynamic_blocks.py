@@ -25,8 +25,7 @@ from motions.language.keys import PhaseKey, PostureKey
 from motions.language.timeline_data import SAME, BeatClock, TimelineData
 
 _Place = tuple[float, float, float]
-_LOW = (-0.03, 0.0, -0.09, 0.0, 0.1, 0.0)
-"""Trunk before it pounces [m, rad]."""
+_LOW = (-0.03, 0.0, -0.09, 0.0, 0.1, 0.0)  #: Trunk before it pounces [m, rad]
 
 
 class DynamicBlocks(TimelineData):

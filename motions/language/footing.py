@@ -17,10 +17,8 @@ from motions.language.timeline_data import SAME, TimelineData
 
 Times = Float[np.ndarray, " n"]
 
-SQUARE = 1e-3
-"""Distance [m] from its place below the hip within which a foot is in it."""
-_ROUND = 64.0
-"""1 / (u^3 (1 - u)^3) at u = 1/2: makes the height of a swing 1 in its middle."""
+SQUARE = 1e-3  #: Distance [m] from its place below the hip within which a foot is in it
+_ROUND = 64.0  #: 1 / (u^3 (1 - u)^3) at u = 1/2: makes the height of a swing 1 in its middle
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,8 +18,7 @@ from go2_wbc.motion_plan import Posture
 from motions.arguments import is_number, word
 from motions.dynamics.phases import ALL_FEET, Phase, PhaseProblem, whole_knots
 
-NEAR = 1e-6
-"""How far an own easing may be from 0 at its start and from 1 at its end."""
+NEAR = 1e-6  #: How far an own easing may be from 0 at its start and from 1 at its end
 _EASES = {ease.value: ease for ease in Ease}
 _TRIED = np.linspace(0.0, 1.0, 101).tolist()
 
@@ -42,10 +41,8 @@ class OwnEase:
         return float(value), 0.0, 0.0
 
 
-Easing = Ease | OwnEase
-"""Checked ways to go."""
-EaseWord = Ease | OwnEase | str | Callable[[float], float]
-"""What an author may write for one."""
+Easing = Ease | OwnEase  #: Checked ways to go
+EaseWord = Ease | OwnEase | str | Callable[[float], float]  #: What an author may write for one
 _REVERSED: dict[Ease, Ease] = {Ease.IN: Ease.OUT, Ease.OUT: Ease.IN}
 
 
@@ -135,8 +132,7 @@ class LegTarget:
         return replace(self, values=(amplitude * x, amplitude * y, amplitude * z))
 
 
-ON_GROUND = LegTarget(Frame.GROUND, (0.0, 0.0, 0.0))
-"""The foot where it stands."""
+ON_GROUND = LegTarget(Frame.GROUND, (0.0, 0.0, 0.0))  #: The foot where it stands
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,8 +145,7 @@ class Key:
     """
 
     instants: ClassVar[tuple[str, ...]] = ("start", "end")
-    moves: ClassVar[str]
-    """What moves, in words."""
+    moves: ClassVar[str]  #: What moves, in words
 
     start: float
     end: float

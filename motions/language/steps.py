@@ -19,10 +19,8 @@ from motions.arguments import positive, quantity
 from motions.language.keys import BalanceShift, Key, StepKey
 from motions.language.timeline_data import SAME, TimelineData
 
-STEP_HEIGHT = 0.05
-"""Height [m] of a foot above the ground in the middle of a step: own choice."""
-FARTHEST_WALK = 20.0
-"""A walk that is longer [m] is a mistake in units: it would take five minutes."""
+STEP_HEIGHT = 0.05  #: Height [m] of a foot above the ground in the middle of a step: own choice
+FARTHEST_WALK = 20.0  #: A walk that is longer [m] is a mistake in units: it would take five minutes
 POINTS = 65
 """Poses between two points of a way: own choice, a millimetre apart at the end of a stride."""
 HALVES, THIRDS = (0.25, 0.5, 1.0, 2.0, 4.0), (1.0 / 3.0, 2.0 / 3.0, 3.0)

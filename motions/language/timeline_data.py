@@ -20,12 +20,10 @@ from motions.arguments import is_number, positive
 from motions.dynamics.phases import Tolerance
 from motions.language.keys import BODY_CHANNELS, BalanceShift, BodyKey, Key, LegKey
 
-SAME = 1e-9
-"""Times this close [s] are the same: absorbs rounding of sums."""
+SAME = 1e-9  #: Times this close [s] are the same: absorbs rounding of sums
 LEAST_BEAT = 0.05
 """Beats that follow closer [s] are no ruler: own choice, 1200 a minute; nobody counts so fast."""
-MOST_BEATS = 10_000
-"""Nor are more than so many: own choice, an hour at 160 a minute."""
+MOST_BEATS = 10_000  #: Nor are more than so many: own choice, an hour at 160 a minute
 
 
 @dataclass(frozen=True, slots=True)

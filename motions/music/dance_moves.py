@@ -20,10 +20,8 @@ smaller, so that speeds are not greater. Own choice."""
 SHIFT_TIME = 0.75
 """Least time [s] in which the trunk moves over three feet, or back: own choice, near to the 0.9 s
 that a timeline takes by itself."""
-TAP_HEIGHT = 0.04
-"""Height [m] of a paw between two taps."""
-LEAST_LIFT = 0.03
-"""Least height [m], whatever the tempo."""
+TAP_HEIGHT = 0.04  #: Height [m] of a paw between two taps
+LEAST_LIFT = 0.03  #: Least height [m], whatever the tempo
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,5 +170,4 @@ MOVES: Mapping[str, Move] = {
     )
 }
 """The moves, by name. Sizes are own choices, well inside of what the check allows."""
-WALTZ = tuple(name for name in MOVES if name.startswith("waltz"))
-"""Those that take a bar of three."""
+WALTZ = tuple(name for name in MOVES if name.startswith("waltz"))  #: Those that take a bar of three

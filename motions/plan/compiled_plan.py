@@ -199,8 +199,7 @@ FORCE_WEIGHT = 1e-2
 """Weight [1/N^2] by which the forces of a solved part are kept to: they lie in the friction cone
 that it was solved with, an even share of the load may not. From 0.001 to 0.1 it makes no difference
 to slips (own experiments)."""
-_CUBIC = 4
-"""Coefficients of a cubic."""
+_CUBIC = 4  #: Coefficients of a cubic
 LEAST_FEET = 3
 """Standing feet that span an area, so that a robot that stops there can keep standing."""
 

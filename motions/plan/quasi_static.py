@@ -35,8 +35,7 @@ mm that tracking adds."""
 UNLOAD_TIME = 0.3
 """Time [s] over which a foot gives up its load before lift-off, if there is that much: own choice,
 so that the forces of the others change slowly."""
-LEAST_RAMP = 0.03
-"""The same [s] where one foot lands as another lifts off."""
+LEAST_RAMP = 0.03  #: The same [s] where one foot lands as another lifts off
 
 
 def compile_quasi_static(

@@ -55,12 +55,9 @@ motion ends, an instant is enough."""
 LEAD = 0.3
 """Time [s] at rest that is solved with what follows or goes before, if there is so much: to begin a
 quick move early, and to come to rest after it. Own choice, 1.7 times sqrt(0.29 m / g)."""
-SLOW = 5e-4
-"""Way [m, rad] between two samples, at most, of what does not just pass home: 0.05 /s."""
-NEAR = 10
-"""Samples beside a rest that are as good as part of it: moves begin and end slowly."""
-SAME_POSE = 1e-4
-"""Difference [m, rad] of configurations that counts as none; splines ring by less."""
+SLOW = 5e-4  #: Way [m, rad] between two samples, at most, of what does not just pass home: 0.05 /s
+NEAR = 10  #: Samples beside a rest that are as good as part of it: moves begin and end slowly
+SAME_POSE = 1e-4  #: Difference [m, rad] of configurations that counts as none; splines ring by less
 
 
 @dataclass(frozen=True, slots=True)

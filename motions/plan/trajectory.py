@@ -33,8 +33,7 @@ from motions.plan.compiled_plan import CompiledPlan, DynamicSpan, PlanSamples
 from motions.plan.tracks import sample_times
 from motions.postures import standing_feet
 
-CENTRING_STEPS = 5
-"""Steps that put the CoM in its place; see ``place``."""
+CENTRING_STEPS = 5  #: Steps that put the CoM in its place; see ``place``
 
 
 @dataclass(frozen=True, slots=True)

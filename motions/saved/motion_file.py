@@ -48,8 +48,7 @@ KINDS: Final[Mapping[str, type[Key]]] = {
 """The kinds of keys by the words that files have for them: a new kind needs a line here."""
 _WORDS: Final[Mapping[type[Key], str]] = {kind: word for word, kind in KINDS.items()}
 _KEYS: Final = "keys"
-_JOINTS: Final = 3
-"""Of a leg."""
+_JOINTS: Final = 3  #: Of a leg
 
 
 @typed("path")

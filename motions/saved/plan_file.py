@@ -19,8 +19,7 @@ from motions.plan.compiled_plan import CompiledPlan
 from motions.saved.values import Decoder, Encoder, Format, content_of, fields_of
 
 PLAN_FORMAT: Final = Format("go2_wbc.plan", 2, "a saved plan", ".plan")
-_DESCRIPTION: Final = "description"
-"""Name of the JSON text in the archive."""
+_DESCRIPTION: Final = "description"  #: Name of the JSON text in the archive
 _ROBOT, _PLAN = "robot", "plan"
 
 

@@ -18,8 +18,7 @@ from viz.content import ReplayContent, checked_content
 from viz.render.frame_renderer import FrameRenderer, ShotStyle
 
 ANIMATION_SUFFIXES = (".webp", ".gif")
-SIZE_LIMIT = 3_000_000
-"""Largest animated WebP [bytes]; the quality is chosen to stay below."""
+SIZE_LIMIT = 3_000_000  #: Largest animated WebP [bytes]; the quality is chosen to stay below
 GIF_SIZE_LIMIT = 24_000_000
 """Largest GIF [bytes], of the same pictures; the number of colours is chosen to stay below."""
 _QUALITIES = (90, 82, 74, 66, 58, 50, 45, 40, 30, 20)

@@ -23,8 +23,7 @@ COLORS = ("#5c7fb0", "#8fb3a5", "#e3d7a8", "#d59a6a", "#a8584f")
 """From the lowest to the highest."""
 LEAST_SPAN = 0.3
 """Heights that differ by less [m] have nearly the same colour: noise is not to be seen."""
-MOST_CELLS = 160_000
-"""Of a grid; of a larger one only each second cell, or third, is kept."""
+MOST_CELLS = 160_000  #: Of a grid; of a larger one only each second cell, or third, is kept
 LEAST_AROUND, SPIKE = 5, 0.05
 """Cells that must be known of nine for the middle one to be drawn, and by how much [m] that may
 stand out from them."""

@@ -23,8 +23,7 @@ from viz.style import ACCENT, INK, MUTED, PLOT_SUFFIXES, STYLE, TRACK, save_figu
 
 RateWithInterval = tuple[float, float, float]
 """A share of the runs, and the lower and upper end of its interval; 0 to 1."""
-MOST_PANELS = 60
-"""Panels that are drawn; more would not be legible."""
+MOST_PANELS = 60  #: Panels that are drawn; more would not be legible
 _COLUMNS = 3
 _PANEL = (3.2, 1.7)  # [inch] width and height of one panel with its words
 _HEAD, _FOOT = 0.8, 0.3  # [inch] above and below the panels

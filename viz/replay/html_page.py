@@ -17,8 +17,7 @@ from viz.replay.packing import compressed_text
 from viz.replay.page_data import content_text, scene_text
 
 HTML_SUFFIXES = (".html", ".htm")
-PAGE_LIMIT = 4_000_000
-"""Largest page [bytes]."""
+PAGE_LIMIT = 4_000_000  #: Largest page [bytes]
 _SCRIPTS = "data stage scene ghost steps flags charts trust verdict sound app"
 """Of the assets, in the order in which they need one another; a live page has another one."""
 

@@ -66,8 +66,7 @@ _FRAME_RATE = 50.0  # [Hz] finer is not seen at 60 Hz screens, swings stay smoot
 _MOST_FRAMES = 6000  # keeps the page of a long recording small; the rate drops instead
 _MOST_MARGINS = 3000  # samples of a margin curve; the least of each step is kept
 _CAMERA_SMOOTHING = 0.7  # [s]
-UNKNOWN = -32768
-"""Height [mm] of a cell of ground that was not seen."""
+UNKNOWN = -32768  #: Height [mm] of a cell of ground that was not seen
 _PLAIN = {"stance": np.uint8, "margin": np.float32, "torque": np.float32}
 """How frames are stored that are not 16-bit numbers between their extremes."""
 

@@ -28,10 +28,8 @@ LOOPBACK = "127.0.0.1"
 LOOPBACK_NAMES = (LOOPBACK, "localhost", "[::1]")
 _HEARTBEAT = 10.0
 """A page that hears nothing for so long [s] gets an empty line, which finds closed pages."""
-_MOST_SENT = 4096
-"""Longest text [bytes] that a page may send."""
-Values = dict[str, float | str]
-"""What was chosen for parameters, by their names."""
+_MOST_SENT = 4096  #: Longest text [bytes] that a page may send
+Values = dict[str, float | str]  #: What was chosen for parameters, by their names
 _HEADERS = {
     "Cache-Control": "no-store",
     "Content-Security-Policy": "default-src 'self' 'unsafe-inline' data: blob:",

@@ -18,10 +18,8 @@ from controller.modes import Outcome
 
 _log = logging.getLogger(__name__)
 
-THREADS = 3
-"""One waits for the motion, the others serve cancels and further goals."""
-FEEDBACK_PERIOD = 0.1
-"""Time [s] between two messages of how far a motion has come."""
+THREADS = 3  #: One waits for the motion, the others serve cancels and further goals
+FEEDBACK_PERIOD = 0.1  #: Time [s] between two messages of how far a motion has come
 
 
 class MotionActions:

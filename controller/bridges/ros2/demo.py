@@ -23,14 +23,10 @@ from controller.navigation import HEADING_TOLERANCE
 from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import RobotState
 
-STAND_HEIGHT = 0.31
-"""Height [m] of the base when standing; the CoM is 2 cm lower."""
-WAY_TOLERANCE = 0.06
-"""Accepted error [m] of the way: commands travel through two processes."""
-TURN_TOLERANCE = 2.0 * math.degrees(HEADING_TOLERANCE)
-"""Accepted error [deg] of the turn."""
-REST_SPEED = 0.05
-"""Speed [m/s] below which the robot rests."""
+STAND_HEIGHT = 0.31  #: Height [m] of the base when standing; the CoM is 2 cm lower
+WAY_TOLERANCE = 0.06  #: Accepted error [m] of the way: commands travel through two processes
+TURN_TOLERANCE = 2.0 * math.degrees(HEADING_TOLERANCE)  #: Accepted error [deg] of the turn
+REST_SPEED = 0.05  #: Speed [m/s] below which the robot rests
 
 
 def _height(_before: RobotState, after: RobotState) -> float:

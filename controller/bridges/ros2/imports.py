@@ -18,8 +18,7 @@ PROFILE_VARIABLE, JAZZY_PROFILE_VARIABLE = (
     "FASTRTPS_DEFAULT_PROFILES_FILE",
 )
 """What names a profile to Fast DDS; the one of Kilted complains about the name of Jazzy."""
-KILTED = 9
-"""Major version of rclpy from which on the distribution is Kilted or newer; Jazzy has 7."""
+KILTED = 9  #: Major version of rclpy from which on the distribution is Kilted or newer; Jazzy has 7
 
 
 def profile_variable() -> str:

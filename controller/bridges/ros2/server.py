@@ -42,12 +42,9 @@ from go2_wbc.plant import MujocoPlant
 
 _log = logging.getLogger(__name__)
 
-IDLE = 0.01
-"""Robot time [s] that passes at a time while nothing is ordered."""
-LATE = 0.25
-"""Lag [s] behind the wall clock after which the pace is given up and taken up anew."""
-LINGER = 0.2
-"""Time [s] in which the last answers reach their callers before the node goes."""
+IDLE = 0.01  #: Robot time [s] that passes at a time while nothing is ordered
+LATE = 0.25  #: Lag [s] behind the wall clock after which the pace is given up and taken up anew
+LINGER = 0.2  #: Time [s] in which the last answers reach their callers before the node goes
 Poll = Callable[[], None]
 """Takes what has come since the last call, at most one queue full, and acts on it."""
 

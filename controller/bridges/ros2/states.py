@@ -21,12 +21,10 @@ from go2_wbc.robot.state import RobotState
 
 _log = logging.getLogger(__name__)
 
-QUEUE = 10
-"""Messages that are kept for a slow reader."""
+QUEUE = 10  #: Messages that are kept for a slow reader
 STATE_RATE, TRANSFORM_RATE = 100.0, 50.0
 """Messages per second of robot time: of what is measured, and of /tf."""
-FEET_ORDER = (Leg.FR, Leg.FL, Leg.RR, Leg.RL)
-"""The order of the feet in ``RobotFootContact``."""
+FEET_ORDER = (Leg.FR, Leg.FL, Leg.RR, Leg.RL)  #: The order of the feet in ``RobotFootContact``
 _NOISE, _ERRORS, _FILTER = SensorNoise(), SensorErrors(), EstimatorConfig()
 IMU_DEVIATIONS: Mapping[str, tuple[float, float, float]] = {
     "ideal": (1e-3, 1e-3, 1e-2),
@@ -37,8 +35,7 @@ IMU_DEVIATIONS: Mapping[str, tuple[float, float, float]] = {
 not 0 with ideal ones, since many filters take 0 for unknown."""
 
 
-Fill = Callable[[Any, RobotState, Any], None]
-"""Writes a state and its stamp into a message."""
+Fill = Callable[[Any, RobotState, Any], None]  #: Writes a state and its stamp into a message
 
 
 @dataclass(slots=True)

@@ -32,14 +32,10 @@ from go2_wbc.validation import POSITIVE, ranged
 
 _log = logging.getLogger(__name__)
 
-SILENCE: Final = 0.05
-"""Time [s] without a good command after which the robot is damped."""
-RELEASE: Final = 0.5
-"""Time [s] without a good command after which low-level control has ended."""
-ANGLE_MARGIN: Final = 0.1
-"""Angle [rad] by which a desired angle may lie beyond the joint's limit."""
-REPORT_PERIOD: Final = 1.0
-"""Time [s] between two reports of the same kind."""
+SILENCE: Final = 0.05  #: Time [s] without a good command after which the robot is damped
+RELEASE: Final = 0.5  #: Time [s] without a good command after which low-level control has ended
+ANGLE_MARGIN: Final = 0.1  #: Angle [rad] by which a desired angle may lie beyond the joint's limit
+REPORT_PERIOD: Final = 1.0  #: Time [s] between two reports of the same kind
 
 
 def intact_message(kind: np.dtype[np.void], data: bytes) -> Shaped[np.ndarray, "1"]:

@@ -42,16 +42,13 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-PERIOD: Final = 0.002
-"""Seconds between two ``rt/lowstate`` of the robot."""
-FIRST_STATE_LIMIT: Final = 5.0
-"""Time [s] in which the robot must be found."""
+PERIOD: Final = 0.002  #: Seconds between two ``rt/lowstate`` of the robot
+FIRST_STATE_LIMIT: Final = 5.0  #: Time [s] in which the robot must be found
 QUEUE: Final = 64
 """States that are kept while the controller is busy; the estimator takes in all of them."""
 EXIT_DAMPINGS, DAMPING_PERIOD = 40, 0.005
 """How often damping is sent at the end, and the time [s] between two of these commands: 0.2 s."""
-WATCH: Final = 0.02
-"""Time [s] between two looks whether the controller still sends commands."""
+WATCH: Final = 0.02  #: Time [s] between two looks whether the controller still sends commands
 SYNC_TRIES, SYNC_LIMIT, SYNC_SILENCE = 5, 0.1, 0.02
 """How often, and how long each time [s], the plant tries to get into step with the robot, and the
 silence [s] that shows that it has."""
@@ -59,8 +56,7 @@ REPEAT, REPEATS = 0.01, 10
 """Silence [s] of the robot after which a command is sent again, and how often at most until the
 limit of stale states: it, or its answer, may be lost, and a simulator in lockstep waits for it. One
 that is only slow takes the repetition for the next command: where more is allowed, wait longer."""
-SWITCHER_LIMIT: Final = 1.0
-"""Time [s] in which the robot's motion switcher must be found."""
+SWITCHER_LIMIT: Final = 1.0  #: Time [s] in which the robot's motion switcher must be found
 RELEASE_LIMIT, RELEASE_PERIOD = 5.0, 0.2
 """Time [s] in which its motion service must let go, and between two requests to."""
 CONSENT: Final = (

@@ -18,12 +18,9 @@ from go2_wbc.errors import CommandError
 
 _log = logging.getLogger(__name__)
 
-PATROL: Final = 0.02
-"""Time [s] after which a server without requests looks after what is pending."""
-QUEUE: Final = 64
-"""Requests that are kept for a server that is busy; of more, the oldest are lost."""
-TRIES: Final = 3
-"""How often a question is asked before silence is taken for an answer."""
+PATROL: Final = 0.02  #: Time [s] after which a server without requests looks after what is pending
+QUEUE: Final = 64  #: Requests that are kept for a server that is busy; of more, the oldest are lost
+TRIES: Final = 3  #: How often a question is asked before silence is taken for an answer
 
 
 @final

@@ -39,8 +39,7 @@ _log = logging.getLogger(__name__)
 
 DISCOVERY: Final = 0.5
 """Time [s] that another robot gets to be heard; some hundredths on an idle machine."""
-SPORT_STATE_TICKS: Final = 10
-"""Control periods between two samples of ``rt/sportmodestate``."""
+SPORT_STATE_TICKS: Final = 10  #: Control periods between two samples of ``rt/sportmodestate``
 COMMAND_QUEUE: Final = 512
 """Low-level commands that are looked at in one tick; of more, the oldest are lost. Garbage at 5 kHz
 must not push out the good ones while a process is paused for a moment."""

@@ -36,12 +36,9 @@ from go2_wbc.planning.trunk import BodyPose
 
 _log = logging.getLogger(__name__)
 
-PATIENCE: Final = 0.8
-"""Time [s] after which a request is answered at the latest."""
-HOLD: Final = 1.0
-"""Time [s] for which a ``Move`` holds."""
-WAITING: Final = 8
-"""Requests that may wait for the running action."""
+PATIENCE: Final = 0.8  #: Time [s] after which a request is answered at the latest
+HOLD: Final = 1.0  #: Time [s] for which a ``Move`` holds
+WAITING: Final = 8  #: Requests that may wait for the running action
 _KNOWN: Final = frozenset(map(int, Api))
 _AT_ONCE: Final = frozenset(
     {

@@ -21,8 +21,7 @@ from go2_wbc.robot.state import JointCommand, PartFault, RobotState
 
 FALLEN_TILT = math.radians(60.0)
 """Tilt of the trunk from which on the robot has fallen, whatever the controller thinks."""
-TOUCH = 1.0
-"""Force [N] between trunk and ground that counts as a touch."""
+TOUCH = 1.0  #: Force [N] between trunk and ground that counts as a touch
 
 
 @dataclass(frozen=True, slots=True)

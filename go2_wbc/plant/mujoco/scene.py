@@ -16,8 +16,7 @@ from go2_wbc.robot.description import BASE_LINK, find_description
 RAMP_PITCH = np.deg2rad(10.0)
 RAMP_START, RAMP_HALF_SIZE = 0.6, (1.0, 0.6, 0.02)
 """m; from where on it rises ahead of the robot, and half its length, width and height."""
-RAMP_MIDDLE = (RAMP_START + np.cos(RAMP_PITCH), 0.0, np.sin(RAMP_PITCH))
-"""m; of its upper side."""
+RAMP_MIDDLE = (RAMP_START + np.cos(RAMP_PITCH), 0.0, np.sin(RAMP_PITCH))  #: m; of its upper side
 _BOX_MASS, _BOX_PLACE, _BOX_HALF_SIZE = 2.0, (0.0, 0.0, 0.10), (0.10, 0.06, 0.04)
 _NOTES = {
     "<mujoco ": """A Go2 with a box on its back, before a ramp. Lengths in m, masses in kg, angles
