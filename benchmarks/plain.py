@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from controller import GO2Controller
-from controller.cli.common import ExitCode, Subparsers, add_parser
-from controller.cli.progress import ProgressLine
+from controller.cli.common import ExitCode, ProgressLine, Subparsers, add_parser
 from controller.demo.run import DemoProgress, run_demo
 from controller.demo.steps import StepResult
 from go2_wbc.compilation import Kernel, all_kernels, call_plain, load_kernels

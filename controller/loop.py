@@ -1,7 +1,7 @@
 """The control loop: one tick is read, check, snapshot, behaviour, whole-body QP, write, record.
 
 Where the QP's constraints contradict each other, the nearest answer is followed
-(``wbc.relaxation``) and the tick is counted; if they give way gravely for ``grave_limit_time``, the
+(``wbc.solvers``) and the tick is counted; if they give way gravely for ``grave_limit_time``, the
 robot is damped for good. Only here a QP failure is caught: the last good torque is held for one
 tick, then the robot is damped while the failure lasts, and for good after ``qp_patience`` ticks;
 every one is counted.
@@ -19,8 +19,7 @@ from math import inf, isfinite
 
 import numpy as np
 
-from controller.behaviours import Behaviour
-from controller.behaviours.joints import DAMPING, Damped
+from controller.behaviours import DAMPING, Behaviour, Damped
 from controller.pacing import REASON
 from controller.telemetry import Telemetry
 from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible
@@ -31,12 +30,12 @@ from go2_wbc.robot.foot_watch import PULLED, FootWatch
 from go2_wbc.robot.latency import LAGS, Latency
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor_watch import MotorWatch
-from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.payload_estimation import PayloadEstimator
+from go2_wbc.robot.rigid_body import NO_PAYLOAD, Payload
 from go2_wbc.robot.safety import FallDetector, SafetyConfig, is_plausible
 from go2_wbc.robot.state import Health, JointCommand, RobotState, Snapshot
 from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
-from go2_wbc.wbc.relaxation import is_grave
+from go2_wbc.wbc.solvers import is_grave
 
 _log = logging.getLogger(__name__)
 

@@ -31,7 +31,7 @@ from controller.modes import (
 from controller.navigation import Goal
 from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
-from controller.seen_terrain import SeenTerrain
+from controller.telemetry import SeenTerrain
 from controller.walker import Walker
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait

@@ -13,8 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 from jaxtyping import Float
 
-from controller.behaviours import Behaviour
-from controller.behaviours.joints import Damped, ServoJoints
+from controller.behaviours import Behaviour, Damped, ServoJoints
 from controller.loop import ControlLoop
 from controller.modes import unfolded_legs
 from controller.runner import Runner

@@ -17,7 +17,6 @@ from weakref import WeakValueDictionary
 
 from controller.behaviours import Behaviour
 from controller.behaviours.standing import Standing
-from controller.errands import NOT_YET, BackgroundLog, Errands, LoopEnded, LoopHangs, Pending
 from controller.loop import ControlLoop, Fault
 from controller.modes import (
     Aborted,
@@ -29,7 +28,7 @@ from controller.modes import (
     standing,
     told,
 )
-from controller.pacing import Pacer
+from controller.pacing import NOT_YET, BackgroundLog, Errands, LoopEnded, LoopHangs, Pacer, Pending
 from go2_wbc.errors import ClosedError, ModeError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.state import Snapshot

@@ -16,8 +16,7 @@ from typing import Any, final
 from controller.go2_controller import GO2Controller
 from controller.jobs import Job, JobServer
 from controller.modes import Aborted, Measurements, Mode, Outcome
-from go2_wbc.errors import ClosedError, Go2WbcError
-from go2_wbc.extras import install_line
+from go2_wbc.errors import ClosedError, Go2WbcError, install_line
 from go2_wbc.planning.command import VelocityCommand
 
 DEAD_ZONE = 0.12

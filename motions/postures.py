@@ -12,8 +12,8 @@ from jaxtyping import Float
 from go2_wbc.curves import Curve
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.reference import Anchor, Reference, Target, TrackedPoint
+from go2_wbc.robot.description import RobotProfile, find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import RobotProfile, find_profile
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.tracking.plan_curves import stand
 from motions.batch_kinematics import Wanted, attitudes, place

@@ -112,7 +112,7 @@ def test_every_contract_catches_an_import_that_breaks_it(tmp_path: Path) -> None
         "go2_wbc.contacts -> go2_wbc.planning.swing",
         "go2_wbc.attic",
         "controller.loop -> controller.cli",
-        "viz.render.camera -> viz.replay.packing",
+        "viz.render.camera -> viz.replay.meshcat_scene",
     ):
         assert clue in report
 

@@ -20,13 +20,13 @@ from controller.cli.common import (
     ExitCode,
     Mjcf,
     Numbers,
+    ProgressLine,
     folder,
     print_json,
     reader,
     shown_path,
     whole,
 )
-from controller.cli.progress import ProgressLine
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.files import checked_output, write_atomically
 
@@ -150,7 +150,7 @@ def run(
 def _run_over_ros(namespace: str, *, as_json: bool) -> int:
     """Run the demo on a robot that another process serves, print the steps."""
     from controller.bridges.ros2.demo import run_ros_demo
-    from controller.cli.progress import ProgressLine
+    from controller.cli.common import ProgressLine
     from controller.demo.steps import DEMO_STEPS, DemoReport
 
     number = count(1)

@@ -31,9 +31,8 @@ from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
 from controller.cli.common import PROGRAM, ExitCode, installed_version, print_json
-from go2_wbc.errors import DescriptionError
-from go2_wbc.extras import EXTRAS
-from go2_wbc.extras import install_line as extra_line
+from go2_wbc.errors import EXTRAS, DescriptionError
+from go2_wbc.errors import install_line as extra_line
 
 WIDTH = 80
 OLDEST_PYTHON, NEWEST_PYTHON = (3, 11), (3, 13)

@@ -16,16 +16,17 @@ import sys
 import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 from controller.cli.common import (
     PROGRAM,
+    TRIES,
     ExitCode,
     Subparsers,
     add_command,
     examples_epilog,
     installed_version,
 )
-from controller.cli.progress import TRIES
 from controller.pacing import REASON
 from go2_wbc.errors import (
     CommandError,
@@ -71,12 +72,12 @@ COMMANDS = tuple(
     for name, place, summary in (
         ("certify", "sweep:certify_command", "how often a motion is done in random worlds"),
         ("check", "motions:check", "can the robot do this motion?"),
-        ("completion", "completion", "what a shell needs to complete this on TAB"),
+        ("completion", "main:completion", "what a shell needs to complete this on TAB"),
         ("dance", "dance", "a dance on the beats of a song"),
         ("demo", "demo", "stand, sit, walk, turn, high five; measured, in 3D"),
         ("doctor", "doctor", "check this installation, say what is missing"),
         ("export", "motions:export", "a motion's trajectory as NumPy or CSV"),
-        ("identify-friction", "identify_friction", "measure the joints' friction"),
+        ("identify-friction", "bridges:friction", "measure the joints' friction"),
         ("list", "motions:list_motions", "the motions, and what can be set"),
         ("new", "motions:new", "write a small motion to start from"),
         ("preview", "motion_preview", "watch a motion, live in the browser"),
@@ -228,6 +229,37 @@ def _explained(error: BaseException) -> tuple[str, ExitCode]:
         return f"{error.filename}: {error.strerror}", ExitCode.RUNTIME
     traceback.print_exception(error)
     return "this is a bug in the program; the lines above say where", ExitCode.RUNTIME
+
+
+SHELLS = ("bash", "zsh", "fish", "tcsh")
+_MOTIONS = "_go2_wbc_motions"
+
+
+def completion(shell: Annotated[str, SHELLS, "which one"]) -> int:
+    """Print the script with which a shell completes `go2-wbc` on TAB.
+
+    Examples:
+        go2-wbc completion bash > ~/.local/share/bash-completion/completions/go2-wbc
+        eval "$(go2-wbc completion bash)"    in this shell only
+        go2-wbc completion zsh > ~/.zfunc/_go2-wbc
+        go2-wbc completion fish > ~/.config/fish/completions/go2-wbc.fish
+    """
+    import shtab
+
+    from motions import motion_names
+
+    parser = build_parser(Program(PROGRAM, "", COMMANDS, ""), None, is_whole=True)
+    completed = {"FILE": shtab.FILE, "FILE.py": shtab.FILE, "DIR": shtab.DIRECTORY}
+    completed["MOTION"] = {**shtab.FILE, "bash": _MOTIONS}
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for option in (option for sub in action.choices.values() for option in sub._actions):
+                if option.metavar in completed:
+                    setattr(option, "complete", completed[option.metavar])  # noqa: B010 - shtab's
+    words = " ".join(motion_names())
+    preamble = f'{_MOTIONS}() {{ compgen -W "{words}" -- $1; compgen -f -- $1; }}'
+    print(shtab.complete(parser, shell, preamble=preamble if shell == "bash" else ""))
+    return ExitCode.OK
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import viz
 from controller.cli.common import (
     ExitCode,
+    ProgressLine,
     page_file,
     plot_file,
     print_json,
@@ -27,7 +28,6 @@ from controller.cli.motion_args import (
     print_verdict,
     the_motion,
 )
-from controller.cli.progress import ProgressLine
 from go2_wbc.errors import Go2WbcError
 
 if TYPE_CHECKING:

@@ -16,6 +16,7 @@ from controller.cli.common import (
     Json,
     Mjcf,
     Numbers,
+    ProgressLine,
     output,
     print_json,
     shown_path,
@@ -32,7 +33,6 @@ from controller.cli.motion_args import (
     the_motion,
 )
 from controller.cli.motion_preview import VIDEO_RATE
-from controller.cli.progress import ProgressLine
 from controller.modes import Mode
 from go2_wbc.errors import ConfigError, PlantError, StanceMismatch
 

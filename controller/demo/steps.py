@@ -14,7 +14,7 @@ from controller.modes import ANGLE_TOLERANCE, HEIGHT_TOLERANCE, STILL_SPEED, Out
 from controller.navigation import HEADING_TOLERANCE
 from go2_wbc.plant.terrain import BOTH, Blocks, Course, Gap, Stairs, Stones, Terrain
 from go2_wbc.recording import Recording
-from go2_wbc.robot.profile import find_profile
+from go2_wbc.robot.description import find_profile
 
 
 @dataclass(frozen=True, slots=True)

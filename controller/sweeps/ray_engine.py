@@ -22,8 +22,7 @@ from controller.sweeps.engine import (
     order_of,
     processors,
 )
-from go2_wbc.errors import MissingDependency, SweepError
-from go2_wbc.extras import install_line
+from go2_wbc.errors import MissingDependency, SweepError, install_line
 
 ATTEMPTS = 4
 """How often an item is tried whose process or machine dies: it takes a moment until a machine is

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Int
 from controller.sweeps.summary import mean_interval, rate_interval
 from controller.sweeps.sweep_file import SEED, Columns, Row
 from go2_wbc.errors import CommandError, unknown_name
-from viz.render.study_plots import Relation
+from viz.render.plots import Relation
 
 DRAWN = ("friction", "mass_scale", "joint_friction", "angle", "phase")
 """Columns of our own studies that a seed varies (``trials``, ``studies``, ``motion_study``)."""

@@ -35,7 +35,6 @@ LAYER = frozenset(
         "numba_extensions",
         "records",
         "validation",
-        "written",
     )
 )
 """How functions are compiled and what they are handed: files below every call, not drawn."""

@@ -20,8 +20,7 @@ from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS
 from go2_wbc.records import Array3, Array4x3, Array12, Array18, Array19, layout_of
 from go2_wbc.robot.description import RobotDescription, find_description
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
-from go2_wbc.robot.payload import NO_PAYLOAD, Payload
-from go2_wbc.robot.rigid_body import RigidBodies, fill_snapshot
+from go2_wbc.robot.rigid_body import NO_PAYLOAD, Payload, RigidBodies, fill_snapshot
 from go2_wbc.robot.state import RobotState, Snapshot
 from go2_wbc.world import PAYLOAD_HALF_SIZE, World
 

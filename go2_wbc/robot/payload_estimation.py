@@ -35,7 +35,7 @@ from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.records import V3, Array3, Array6, Array12, Array18, Record, packed
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import JointFriction, friction_torque
-from go2_wbc.robot.payload import NO_PAYLOAD, Payload
+from go2_wbc.robot.rigid_body import NO_PAYLOAD, Payload
 from go2_wbc.robot.state import RobotState, Snapshot
 from go2_wbc.validation import FINITE, POSITIVE, SHARE, between, ranged, require
 

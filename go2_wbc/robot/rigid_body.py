@@ -13,12 +13,16 @@ computed along the axes of its hip, which the hip's angle turns about x from the
 calf turn about y of these axes, so that few rotations are left.
 
 A body is its mass m, its first moment h = m c and its inertia I = (xx, xy, xz, yy, yz, zz), both
-about the origin of its joint.
+about the origin of its joint. The trunk may carry a
+point mass beside its own parts.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+import pinocchio as pin
 from jaxtyping import Float
 
 from go2_wbc.algebra.linear import (
@@ -35,8 +39,31 @@ from go2_wbc.algebra.linear import (
 )
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.records import V3, Array4x3, Array12, Array18, Array19, Record
-from go2_wbc.robot.payload import Payload
 from go2_wbc.robot.state import Snapshot
+from go2_wbc.validation import FINITE, NOT_NEGATIVE, ranged
+
+
+@dataclass(frozen=True, slots=True)
+@ranged(mass=NOT_NEGATIVE, place=FINITE)
+class Payload:
+    """A point mass that is fixed to the trunk.
+
+    Attributes:
+        mass: [kg].
+        place: in the base frame [m].
+    """
+
+    mass: float = 0.0
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def inertia(self) -> pin.Inertia:
+        """About the base's origin."""
+        return pin.Inertia(self.mass, np.array(self.place), np.zeros((3, 3)))
+
+
+NO_PAYLOAD = Payload()  #: The robot carries nothing
+
 
 Inertia = tuple[float, float, float, float, float, float]
 Body = tuple[float, V3, Inertia]

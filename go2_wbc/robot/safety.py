@@ -18,7 +18,7 @@ from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.compilation import Foreign, kernel
 from go2_wbc.records import Array4, Array12, Array18, Array19, ArrayNx3
-from go2_wbc.robot.profile import RobotProfile, find_profile
+from go2_wbc.robot.description import RobotProfile, find_profile
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.validation import POSITIVE, ranged
 
@@ -89,7 +89,7 @@ class SafetyConfig:
         stale_limit: time [s] without news from the plant after which it counts as silent.
         qp_patience: QP failures in a row after which the robot is damped for good.
         grave_limit_time: time [s] for which its constraints may give way by more than
-            ``wbc.relaxation.LIMITS`` before it is damped for good; after pushes that a trot
+            ``wbc.solvers.LIMITS`` before it is damped for good; after pushes that a trot
             withstood 0.036 at most (a hip at its stop).
     """
 

@@ -21,7 +21,7 @@ from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.errors import CommandError
 from go2_wbc.records import Array3, Array3x3, Array4, Array4x3, Array12, Array18, Array19, Record
-from go2_wbc.robot.profile import RobotProfile, find_profile
+from go2_wbc.robot.description import RobotProfile, find_profile
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,8 +39,7 @@ from go2_wbc.wbc.constraints import (
     torque_map,
 )
 from go2_wbc.wbc.problem import ACCELERATION, FORCES, SIZE, Bounds, Problem, Rows, Source
-from go2_wbc.wbc.relaxation import solve_relaxed
-from go2_wbc.wbc.solvers import check_solver
+from go2_wbc.wbc.solvers import check_solver, solve_relaxed
 from go2_wbc.wbc.tasks import BuiltInTasks, Task
 
 GREATEST_EXTRA_WEIGHT = 1e4

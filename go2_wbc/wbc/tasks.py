@@ -25,8 +25,8 @@ from go2_wbc.records import V3, Array18, Record, packed
 from go2_wbc.reference import JOINTS, STANCE, SWING, Reference, Target
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.config import Gains, WbcConfig
-from go2_wbc.wbc.loads import plan_loads
 from go2_wbc.wbc.problem import SIZE, Rows, Source
+from go2_wbc.wbc.trajectory_loads import plan_loads
 
 LARGEST_ERROR = 3.0  #: Orientation error [rad] beyond which its sine says little about it
 NO_ROTATION = 0.01

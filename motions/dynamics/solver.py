@@ -10,8 +10,7 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
-from go2_wbc.errors import MissingDependency, PlanNotFound, TimelineError
-from go2_wbc.extras import install_line
+from go2_wbc.errors import MissingDependency, PlanNotFound, TimelineError, install_line
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy

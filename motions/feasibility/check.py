@@ -17,8 +17,8 @@ from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.recording import Recording
+from go2_wbc.robot.description import GO2, RobotProfile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import GO2, RobotProfile
 from go2_wbc.world import World
 from motions.authoring import Motion
 from motions.batch_kinematics import centres_of_mass
@@ -35,7 +35,7 @@ from motions.plan.compiled_plan import LEAST_FEET, CompiledPlan, Problem
 from motions.plan.timeline_compiler import Broken, compile_timeline
 from motions.plan.trajectory import Trajectory, trajectory_of
 from motions.registry import load_motion
-from motions.saved.plan_file import is_saved_plan, load_plan
+from motions.saved.files import is_saved_plan, load_plan
 
 BALANCE, WAY = "balance", "way of a foot"  #: Problems of the compiler
 SLIDING = 0.17

@@ -19,7 +19,7 @@ from go2_wbc.legs import LEGS, Leg
 from go2_wbc.motion_plan import Posture
 from motions import arguments
 from motions.arguments import positive, quantity
-from motions.dynamics import phase_builders as build
+from motions.dynamics import phases as build
 from motions.dynamics.phases import BODY_COORDINATES, Phase
 from motions.language.keys import PhaseKey, PostureKey
 from motions.language.timeline_data import SAME, BeatClock, TimelineData

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from go2_wbc.robot.profile import find_profile
+from go2_wbc.robot.description import find_profile
 from motions import Choice, Range, Timeline, deg, motion
 
 Side = Annotated[str, Choice("left", "right")]

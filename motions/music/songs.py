@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.errors import CommandError, MissingDependency
-from go2_wbc.extras import install_line
+from go2_wbc.errors import CommandError, MissingDependency, install_line
 from go2_wbc.files import checked_output, write_atomically
 from motions.arguments import positive
 

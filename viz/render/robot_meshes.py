@@ -17,6 +17,7 @@ from jaxtyping import Float
 from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.recording import Recording
 from go2_wbc.robot.description import (
+    GO2,
     MeshPart,
     RobotDescription,
     find_description,
@@ -24,7 +25,6 @@ from go2_wbc.robot.description import (
     read_mesh,
     solid,
 )
-from go2_wbc.robot.profile import GO2
 from viz.render.mesh import Surface, simplify, smooth_surface
 
 _CREASE = np.deg2rad(22.0)  # the files have lost their smoothing; 22 deg looks like it

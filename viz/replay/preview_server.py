@@ -19,8 +19,7 @@ from typing import final
 
 from go2_wbc.errors import ConfigError
 from viz.content import ReplayContent, checked_content
-from viz.replay.html_page import page_text
-from viz.replay.page_data import content_text, scene_text
+from viz.replay.page_data import content_text, page_text, scene_text
 
 _log = logging.getLogger(__name__)
 

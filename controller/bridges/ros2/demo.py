@@ -20,7 +20,7 @@ from controller.demo.steps import (
 )
 from controller.modes import HEIGHT_TOLERANCE
 from controller.navigation import HEADING_TOLERANCE
-from go2_wbc.robot.profile import find_profile
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.state import RobotState
 
 STAND_HEIGHT = 0.31  #: Height [m] of the base when standing; the CoM is 2 cm lower

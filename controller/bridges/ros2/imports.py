@@ -8,8 +8,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from go2_wbc.errors import MissingDependency
-from go2_wbc.extras import install_line
+from go2_wbc.errors import MissingDependency, install_line
 
 INSTALL = install_line("ros2")
 BUILD = "ros2/build_interfaces.sh python3 dist && python -m pip install dist/*.whl"

@@ -19,7 +19,7 @@ from typing import Final, final
 import numpy as np
 from jaxtyping import Float, Shaped
 
-from controller.behaviours.joints import DAMPING
+from controller.behaviours import DAMPING
 from controller.bridges.unitree import messages
 from controller.bridges.unitree.messages import FEET_SWAPPED, JOINTS_SWAPPED, MOTORS, decode_message
 from controller.pacing import LogThrottle

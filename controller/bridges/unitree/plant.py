@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, final
 
 import numpy as np
 
-from controller.behaviours.joints import DAMPING
+from controller.behaviours import DAMPING
 from controller.bridges.unitree import LOOPBACK, require_dds
 from controller.bridges.unitree.low_level import (
     GuardConfig,
@@ -28,8 +28,7 @@ from controller.bridges.unitree.low_level import (
 )
 from controller.bridges.unitree.messages import LOW_STATE, encode_message
 from controller.bridges.unitree.sport_api import SWITCHER_SERVICE, Code, SwitcherApi
-from controller.errands import BackgroundLog
-from controller.pacing import SWITCH_INTERVAL
+from controller.pacing import SWITCH_INTERVAL, BackgroundLog
 from go2_wbc.errors import ClosedError, CommandError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.estimator import EstimatorConfig, StateEstimator

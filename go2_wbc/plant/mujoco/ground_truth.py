@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int
 
 from go2_wbc.legs import JOINT_NAMES
 from go2_wbc.plant.base import Plant, Scan
-from go2_wbc.plant.mujoco.contacts import Contacts, foot_contacts, touches_itself
+from go2_wbc.plant.mujoco.forces import Contacts, foot_contacts, touches_itself
 from go2_wbc.plant.mujoco.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand, PartFault, RobotState

@@ -18,8 +18,7 @@ from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant.mujoco.visuals import add_visuals
 from go2_wbc.plant.terrain import Terrain
-from go2_wbc.robot.description import BASE_LINK, RobotDescription
-from go2_wbc.robot.profile import RobotProfile, find_profile
+from go2_wbc.robot.description import BASE_LINK, RobotDescription, RobotProfile, find_profile
 from go2_wbc.validation import NOT_NEGATIVE, ranged
 from go2_wbc.world import PAYLOAD_HALF_SIZE
 
@@ -31,6 +30,7 @@ ACCELEROMETER = "go2_wbc_accelerometer"
 ORIENTATION = "go2_wbc_orientation"
 PAYLOAD_BODY = "go2_wbc_payload"
 
+DEFAULT_FRICTION = 0.8  #: Dry rubber on a hard floor; Unitree publishes none
 # Torsional (m) and rolling (m) friction: MuJoCo's defaults; unused by point contacts (condim 3).
 _TORSIONAL, _ROLLING = 0.005, 0.0001
 # Ratio of frictional to normal constraint impedance. 1 lets a standing foot creep; 10 does not, and

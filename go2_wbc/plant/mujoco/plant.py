@@ -17,20 +17,18 @@ from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, u
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant, Scan
 from go2_wbc.plant.faults import HELD_TIME, Faults, InjectedFault
-from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
+from go2_wbc.plant.mujoco.forces import Contacts, FootContacts, Pushes, foot_contacts
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN, bin_forces, read_joints
 from go2_wbc.plant.mujoco.lidar import DepthConfig, LidarConfig, RangeSensor, chosen
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
-from go2_wbc.plant.mujoco.pushes import Pushes
-from go2_wbc.plant.mujoco.settling import settle
-from go2_wbc.plant.mujoco.setup import PlantSetup, SavedPhysics, command_numbers, prepare
+from go2_wbc.plant.mujoco.setup import PlantSetup, SavedPhysics, command_numbers, prepare, settle
 from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors, SensorNoise
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.records import packed
+from go2_wbc.robot.description import GO2
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel, drive
-from go2_wbc.robot.profile import GO2
 from go2_wbc.robot.state import JointCommand, OdometryCovariance, PartFault, RobotState
 from go2_wbc.world import SENSORS
 

@@ -14,10 +14,9 @@ import pytest
 
 import viz
 from controller.cli import demo
-from controller.cli.common import ExitCode
+from controller.cli.common import ExitCode, ProgressLine, progress_bar
 from controller.cli.demo import render
 from controller.cli.main import high_five_demo
-from controller.cli.progress import ProgressLine, progress_bar
 from controller.demo import DemoReport, DemoTotals, Measurement, StepResult, run_demo
 from controller.demo.steps import TERRAINS
 from go2_wbc.config import Config

@@ -13,7 +13,8 @@ import pytest
 
 from go2_wbc.errors import PlanNotFound
 from go2_wbc.robot.model import RobotModel
-from motions.dynamics import DynamicTrajectory, PhaseProblem, Tolerance, phase_builders, solve
+from motions.dynamics import DynamicTrajectory, PhaseProblem, Tolerance, solve
+from motions.dynamics import phases as phase_builders
 from motions.dynamics.knots import Knots, Solution, knots_of, pose_of
 from motions.dynamics.phases import Phase
 from motions.dynamics.plan_audit import PlanLimits, Weights
