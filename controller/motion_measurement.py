@@ -157,8 +157,7 @@ class MotionMeasurement:
 
     Attributes:
         fall: why the robot fell, or went limp because it fell, or None.
-        said: what ``play`` said.
-        reason: in its words.
+        said, reason: what ``play`` said, in its words.
         slip: largest distance [m] that the material of a standing foot slid at its contact point.
         torque, speed: largest share of a joint's torque and speed limit.
         saturated: time [s] in which some motor gave all it has.

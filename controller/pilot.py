@@ -52,8 +52,7 @@ class Pilot:
     """Runs procedures on one loop.
 
     Attributes:
-        mode: what the robot is doing.
-        playing: the behaviour that plays a motion, or None.
+        mode, playing: what the robot is doing; the behaviour that plays a motion, or None.
         runner: lets time pass; ``runner.loop`` has the newest state and the telemetry.
         close: go limp and stop; the plant stays open. Idempotent.
     """

@@ -142,12 +142,9 @@ class BodyTarget:
 
     Attributes:
         point: whether position means the CoM or the origin of the base.
-        p_world: position [m].
-        v_world: linear velocity [m/s].
-        a_world: linear acceleration [m/s^2].
+        p_world, v_world, a_world: position [m], linear velocity [m/s] and acceleration [m/s^2].
         R_world_base: orientation.
-        w_world: angular velocity [rad/s].
-        dw_world: angular acceleration [rad/s^2].
+        w_world, dw_world: angular velocity [rad/s] and acceleration [rad/s^2].
     """
 
     point: TrackedPoint

@@ -114,8 +114,7 @@ class Motion:
     """A motion that can be made with other parameters.
 
     Attributes:
-        name: what users call it.
-        summary: first line of its docstring.
+        name, summary: what users call it, and the first line of its docstring.
         parameters: what can be chosen.
         source: file and line where it is written.
     """

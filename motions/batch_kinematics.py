@@ -32,8 +32,7 @@ class Wanted:
     """What is asked of trunk and legs at every instant.
 
     Attributes:
-        p: (n, 3) place [m] of the CoM, or of the base.
-        is_com: (n,) of which.
+        p, is_com: (n, 3) place [m] of the CoM, or of the base; (n,) of which.
         R: (n, 3, 3) attitude of the trunk.
         q_joints: (n, 12) angles [rad] of the raised legs; those of the others do not count.
         raised: (n, 4) legs that follow their joints; the others, their feet.

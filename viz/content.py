@@ -63,9 +63,7 @@ class Annotation:
     """A limit that one subject breaks, or nearly does.
 
     Attributes:
-        limit: its name.
-        subject: joint, foot or part of the body.
-        time: when [s] it is worst.
+        limit, subject, time: its name; joint, foot or part of the body; when [s] it is worst.
         text: value and limit in words.
         is_broken: otherwise the margin is only tight.
         spans: start and end [s] of each stretch in which it is so.
@@ -103,10 +101,8 @@ class CertifiedRate:
     """How often a movement was done in randomised runs.
 
     Attributes:
-        n: runs.
-        done: runs in which it was done.
-        interval: of the true rate, 0 to 1.
-        confidence: of the interval, 0 to 1.
+        n, done: runs, and those in which it was done.
+        interval, confidence: of the true rate, 0 to 1, and of the interval.
         world: in which it holds, in words.
         worst: the worst runs, the worst first.
         versions: what else it holds for, by name.

@@ -51,8 +51,7 @@ class SafeReturn:
     """Runs the clock of a plan smoothly from one instant to the nearest safe one.
 
     Attributes:
-        t: where its clock stands [s].
-        target: the safe instant [s].
+        t, target: where its clock stands, and the safe instant [s].
         is_over: whether it has been reached.
     """
 

@@ -32,9 +32,7 @@ class DemoProgress:
     """Where a running demo is; told once when a step begins and once when it has ended.
 
     Attributes:
-        index: of the step, from 0.
-        count: how many steps there are.
-        label: what the step does.
+        index, count, label: of the step, from 0, how many there are, and what it does.
         result: what came of it; None when it begins.
     """
 

@@ -56,12 +56,9 @@ class StepResult:
     """What came of one step.
 
     Attributes:
-        name: identifies the step.
-        label: says what was to be done.
-        ok: whether the measurements show that it was done.
-        reason: why, in plain words.
-        start: plant time [s] at which it began.
-        duration: robot time [s] that it took.
+        name, label: identify the step, and say what was to be done.
+        ok, reason: whether the measurements show that it was done; why, in plain words.
+        start, duration: plant time [s] at which it began, and robot time [s] that it took.
         figures: what was measured.
     """
 
@@ -159,8 +156,7 @@ class StepRun:
     """One step that has just been run, ready to be measured.
 
     Attributes:
-        outcome: of its last blocking call.
-        recording: what happened in it, at least one sample.
+        outcome, recording: of its last blocking call, and what happened in it, at least one sample.
     """
 
     outcome: Outcome
@@ -172,8 +168,7 @@ class DemoStep:
     """One step of the demo.
 
     Attributes:
-        name: identifies the step in reports.
-        label: says what is done, in at most 21 characters.
+        name, label: identify the step in reports, and say what is done, in at most 21 characters.
         act: does it; False means that it was not done, None that the figures must tell.
         measure: figures from what was measured, never from what was commanded.
     """

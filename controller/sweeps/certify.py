@@ -41,9 +41,7 @@ class Certificate:
     """How often a motion was done.
 
     Attributes:
-        motion: its name.
-        n: runs that were looked at.
-        done: runs in which it was done.
+        motion, n, done: its name, runs that were looked at, and in which it was done.
         interval: of 95 % of the true rate.
         worst: the worst runs, the worst first: their rows in ``path``.
         about: what the certificate holds for: versions, and digests of code and plan.

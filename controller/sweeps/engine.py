@@ -53,8 +53,7 @@ class Failure:
     """Why an item has no value.
 
     Attributes:
-        text: in one line.
-        details: the traceback, or empty.
+        text, details: in one line; the traceback, or empty.
         has_died: whether its process ended, again and again, rather than the function raising.
     """
 
@@ -87,8 +86,7 @@ class Trials(Generic[Item]):
     """The items of a run, by their numbers: what is to be sent, and how often it was.
 
     Attributes:
-        pickled: the items, to be sent.
-        waiting: those that no process has.
+        pickled, waiting: the items, to be sent, and those that no process has.
     """
 
     def __init__(self, items: Sequence[Item], attempts: int) -> None:

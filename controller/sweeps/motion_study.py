@@ -115,8 +115,7 @@ class Replay:
     """A run of a motion with a seed.
 
     Attributes:
-        title: what was run.
-        row: what was measured now.
+        title, row: what was run, and what was measured now.
         differences: the values that are not those of the row that is kept; none, to the last bit,
             under the same version, on the same kind of processor.
         content: what ``viz`` shows of it.

@@ -20,9 +20,7 @@ class Rate:
     """A truth value over all rows.
 
     Attributes:
-        name: of the column.
-        n: how many rows have it.
-        count: in how many it is true.
+        name, n, count: of the column, how many rows have it, and in how many it is true.
         low, high: 95 % interval of the true rate (Clopper and Pearson, 1934).
     """
 
@@ -47,8 +45,7 @@ class Spread:
         n: how many rows have a number that is finite; the rest counts for it only.
         mean: of these.
         low, high: 95 % interval of the true mean (Student's t); nan for fewer than two rows.
-        least, most: extremes.
-        percentiles: the 5th, the 50th and the 95th.
+        least, most, percentiles: extremes; the 5th, the 50th and the 95th.
     """
 
     name: str
@@ -68,8 +65,7 @@ class Words:
     Attributes:
         name: of the column.
         n: how many rows have one that is not empty.
-        kinds: how many different ones there are.
-        commonest: the most frequent one, and its number.
+        kinds, commonest: how many different ones there are; the most frequent one, and its number.
     """
 
     name: str

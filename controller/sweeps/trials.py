@@ -95,9 +95,7 @@ class TrialRobot:
     """A robot on trial, lying at first: calls succeed, or ``TrialFailed`` is raised.
 
     Attributes:
-        go2: the controller.
-        plant: the simulated robot, for pushes.
-        truth: what MuJoCo says.
+        go2, plant, truth: the controller, the simulated robot, for pushes, and what MuJoCo says.
     """
 
     def __init__(self, trial: Trial | MujocoPlant, config: Config | None = None) -> None:
@@ -157,8 +155,7 @@ class GaitStudy:
     """Walks with a velocity, on flat ground.
 
     Attributes:
-        gait: its name.
-        command: forward and left [m/s], turning left [rad/s].
+        gait, command: its name; forward and left [m/s], turning left [rad/s].
     """
 
     gait: str
@@ -191,8 +188,7 @@ class PushStudy:
     """Pushes the base of a trotting or standing robot, from any side, at any time of the stride.
 
     Attributes:
-        impulse: of the push [N s], over 0.1 s.
-        speed: at which the robot trots [m/s]; 0 stands.
+        impulse, speed: of the push [N s], over 0.1 s; at which the robot trots [m/s], 0 stands.
     """
 
     impulse: float

@@ -15,8 +15,7 @@ class Block:
     """A box that is fixed to the world.
 
     Attributes:
-        centre: of the box [m].
-        half_size: half of its sides [m].
+        centre, half_size: of the box, and half of its sides [m].
         yaw: by which it is turned about z [rad].
         pitch: by which it is turned about its own y axis before [rad]; positive lowers its +x end.
         friction: sliding friction coefficient on it, in the place of the plant's; None for that.

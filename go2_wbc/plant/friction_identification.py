@@ -62,10 +62,8 @@ class FrictionEstimate:
     """What was identified: FL hip, thigh, calf, then FR, RL, RR.
 
     Attributes:
-        dry: dry friction [N m].
-        viscous: viscous friction [N m s/rad].
-        dry_error: standard error of ``dry`` [N m].
-        viscous_error: standard error of ``viscous`` [N m s/rad].
+        dry, viscous: friction [N m], [N m s/rad].
+        dry_error, viscous_error: their standard errors.
     """
 
     dry: Float[np.ndarray, "12"]

@@ -149,12 +149,10 @@ class RobotDescription:
 
     Attributes:
         profile: what the URDF does not say of the robot.
-        urdf_path: the URDF.
-        srdf_path: the SRDF, or ``None`` if there is none.
+        urdf_path, srdf_path: the URDF, and the SRDF or ``None`` if there is none.
         package_dirs: folders against which ``package://`` mesh names resolve, first match wins.
         disabled_pairs: pairs of links that the SRDF excludes from collision.
-        efforts: torque limit of each joint [N m], in the order of ``JOINT_NAMES``.
-        speeds: speed limit of each joint [rad/s], in the order of ``JOINT_NAMES``.
+        efforts, speeds: limits of each joint [N m], [rad/s], in the order of ``JOINT_NAMES``.
         mass: of all links [kg].
         origins: of each joint in the frame of the one above it [m], in the order of
             ``JOINT_NAMES``; those of hips in the frame of the base.
@@ -339,8 +337,7 @@ class MeshPart:
     """All faces of a mesh file that have one colour.
 
     Attributes:
-        points: (n, 3) vertices [m] in the frame of the file.
-        triangles: (m, 3) rows of ``points``.
+        points, triangles: (n, 3) vertices [m] in the frame of the file, and (m, 3) rows of them.
         rgba: red, green, blue, opacity in 0..1.
     """
 

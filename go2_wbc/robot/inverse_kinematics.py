@@ -52,8 +52,7 @@ class PoseTargets:
 
     Attributes:
         p_world_feet: foot centres [m]; the row of a raised leg is not used.
-        rpy: roll, pitch, yaw [rad] of the trunk.
-        height: height [m] of the base's origin.
+        rpy, height: roll, pitch, yaw [rad] of the trunk, and height [m] of the base's origin.
         raised: leg in the air, if any; its joints stay as they are at the start.
         com_margin: least distance [m] of the CoM to the edges of the support polygon.
         joint_margin: least distance [rad] of every joint to its limits.

@@ -54,8 +54,7 @@ class LegGeometry:
     Attributes:
         p_base_hip: origin of the hip's axis in the base frame [m].
         width: distance [m] from the hip's axis to the plane of the leg, positive to the left.
-        thigh: from the thigh's axis to the knee [m].
-        calf: from the knee to the foot's centre [m].
+        thigh, calf: from the thigh's axis to the knee, and from there to the foot's centre [m].
     """
 
     p_base_hip: Array3

@@ -40,12 +40,9 @@ class RobotModel:
         description: the files that the robot was loaded from.
         profile: what they do not say of it.
         pin_model: Pinocchio's model, with rotor inertia.
-        foot_radius: radius [m] of the spherical feet.
-        mass: total mass [kg].
-        gravity: 9.81 [m/s^2].
+        foot_radius, mass, gravity: radius [m] of the spherical feet, total mass [kg], 9.81 [m/s^2].
         motor: what the motors give at which speed.
-        torque_limits: (12,) [N m], the motors' peak.
-        speed_limits: (12,) [rad/s].
+        torque_limits, speed_limits: (12,) the motors' peak [N m], and [rad/s].
         q_lower, q_upper: (12,) joint limits [rad], the tighter of URDF and published ones.
         p_base_imu: (3,) place of the IMU in the base frame [m].
         p_base_hips: (4, 3) hip abduction axes' origins in the base frame [m].

@@ -263,8 +263,7 @@ class FrictionFeedForward:
     """Turns the torques of the dynamics into the motors', within what these give at their speeds.
 
     Attributes:
-        friction: what is fed forward.
-        motor: what gives it.
+        friction, motor: what is fed forward, and what gives it.
     """
 
     friction: JointFriction

@@ -119,8 +119,7 @@ class PayloadWrench(Record):
     """What a payload takes of the standing feet, in the base frame.
 
     Attributes:
-        force: [N].
-        moment: about the base's origin [N m].
+        force, moment: [N], and about the base's origin [N m].
         weight: of a unit of mass, by gravity and the base's acceleration [m/s^2].
     """
 

@@ -49,8 +49,7 @@ class Payload:
     """A point mass that is fixed to the trunk.
 
     Attributes:
-        mass: [kg].
-        place: in the base frame [m].
+        mass, place: [kg], and in the base frame [m].
     """
 
     mass: float = 0.0
@@ -77,9 +76,7 @@ class RigidBodies(Record):
     """The robot's numbers: of trunk, then hip, thigh and calf of each leg.
 
     Attributes:
-        mass: of all [kg], with the payload.
-        gravity: [m/s^2].
-        foot_radius: [m].
+        mass, gravity, foot_radius: of all [kg], with the payload; [m/s^2]; [m].
         link_mass: [kg]; the payload is in the trunk's, as in the next two.
         link_moment: first moment [kg m].
         link_inertia: as of a body [kg m^2].

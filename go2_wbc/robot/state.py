@@ -115,9 +115,7 @@ class SensorReading:
         time: robot time [s].
         gyro: angular velocity [rad/s] in the base frame.
         accelerometer: specific force [m/s^2] in the base frame; +9.81 upwards at rest.
-        q_joints: joint angles [rad].
-        v_joints: joint velocities [rad/s].
-        tau: joint torques [N m].
+        q_joints, v_joints, tau: joint angles [rad], velocities [rad/s] and torques [N m].
         foot_forces: normal force at each foot [N].
     """
 
@@ -245,8 +243,7 @@ class Snapshot(Record):
     """State and dynamics of one tick. Accelerations use Pinocchio's spatial base acceleration.
 
     Attributes:
-        state: the measured state that everything here belongs to.
-        profile: of the robot.
+        state, profile: the measured state that everything here belongs to, and that of the robot.
         q, v: its configuration and velocity.
         R_world_base: base orientation.
         mass_matrix: M(q) with rotor inertia.

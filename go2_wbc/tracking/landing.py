@@ -94,8 +94,7 @@ class Landing(Record):
     """Where a plan is, which landings move, and how its feet are.
 
     Attributes:
-        anchor: where the plan is now.
-        origin: where it was at first.
+        anchor, origin: where the plan is now, and was at first.
         feet: all of them.
         missed, error: see ``Landings``.
     """

@@ -58,8 +58,7 @@ class Deviation:
     """How far a robot has been off its plan, on the average over the ticks so far.
 
     Attributes:
-        place: of the tracked point [m].
-        attitude: angle of the trunk [rad].
+        place, attitude: of the tracked point [m], angle of the trunk [rad].
         joints: angle [rad] of the worst joint of a raised leg, over the ticks that had one; None
             if there was none.
     """
@@ -88,8 +87,7 @@ class Tracking(Record):
     """State of a plan that is followed.
 
     Attributes:
-        landing: where the plan is, and its feet.
-        correction: of the trunk's target.
+        landing, correction: where the plan is, and its feet; of the trunk's target.
         place, attitude, joints: see ``Deviation``.
         ticks, raised_ticks: how many there have been, and of those with a raised leg.
         sag: depth [m] of the tracked point below the plan, now.

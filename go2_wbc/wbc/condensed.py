@@ -208,8 +208,7 @@ class Decision(Record):
 
     Attributes:
         z: see ``problem``.
-        tau: joint torques [N m] without friction.
-        tau_motors: those that the motors are told [N m].
+        tau, tau_motors: joint torques [N m] without friction, and those that the motors are told.
     """
 
     z: Array30
@@ -223,8 +222,7 @@ class Workspace(Record):
     Attributes:
         tasks, limits: rows of the built-in tasks and of the inequalities.
         reduction: what follows from the unknowns u.
-        H, g: the cost u'Hu/2 + g'u; only the lower half of H is filled.
-        L: H = L L'.
+        H, g, L: the cost u'Hu/2 + g'u; only the lower half of H = L L' is filled.
         u: the unknowns.
         C, lower, upper: the inequalities in u.
     """

@@ -286,8 +286,7 @@ class JointLimits(Inequality):
     the ground, is for the QP to tell.
 
     Attributes:
-        q_lower, q_upper: position limits [rad].
-        speed: speed limits [rad/s].
+        q_lower, q_upper, speed: limits of position [rad] and speed [rad/s].
         braking: deceleration [rad/s^2] that is always available.
         horizon: time [s] in which a bound on the velocity must be met.
     """

@@ -61,10 +61,8 @@ class Problem:
 
     Attributes:
         snapshot, reference: what the rows were made from.
-        tasks: stacked task rows, not weighted.
-        weights: (rows,) weight of each task row.
-        equalities: stacked equality rows.
-        bounds: stacked inequality rows.
+        tasks, weights: stacked task rows, not weighted, and (rows,) the weight of each.
+        equalities, bounds: stacked rows of equalities and inequalities.
         sources: who contributed rows, tasks first, then equalities, then bounds.
         counts: how many rows each of them contributed.
     """

@@ -60,8 +60,7 @@ class TaskRows(Record):
 
     Attributes:
         A: columns: the base's acceleration (6), and three unknowns of each leg (12).
-        b: right sides.
-        weight: of each row.
+        b, weight: right side and weight of each row.
     """
 
     A: Float[np.ndarray, "18 18"]

@@ -130,9 +130,7 @@ class LoadNumbers:
 
     Attributes:
         evenness: weight of an even share, against 1 of the wrench.
-        weight: of the robot [N].
-        force_max: greatest normal force [N] of a foot.
-        foot_radius: [m].
+        weight, force_max, foot_radius: of the robot [N], greatest normal force [N] of a foot, [m].
     """
 
     evenness: float
@@ -150,8 +148,7 @@ class LoadedFeet(NamedTuple):
         load: what each is expected to bear, over their mean.
         points: of all legs, see ``LegPoints``.
         A: the wrench on the base of a force on each foot along each of the world's axes.
-        f: their forces [N].
-        missing: what these leave of the wrench.
+        f, missing: their forces [N], and what these leave of the wrench.
     """
 
     leg: Int[np.ndarray, "4"]

@@ -87,8 +87,7 @@ class DynamicTrajectory:
         gains: (n, 12, 36) feedback of a state error (as Pinocchio's ``difference`` of planned and
             measured q, then of v) into torques: tau - gains @ error.
         p_feet: (n+1, 4, 3) centres of the feet [m].
-        iterations: of the solver, over all its starts.
-        cost: at the end.
+        iterations, cost: of the solver, over all its starts, and at the end.
         misses: what was asked at the phases' ends, and how far the plan is from it.
         lag: time [s] by which the plan is late against a motion that was written as a whole.
     """

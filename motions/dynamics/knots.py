@@ -58,8 +58,7 @@ class Knots:
     """A problem at its n + 1 knots; rows of what has n hold from one knot to the next.
 
     Attributes:
-        times: (n+1,) [s].
-        stance: (n, 4) feet that stand.
+        times, stance: (n+1,) [s], (n, 4) feet that stand.
         p_stance: (n, 4, 3) where those that stand do [m].
         goals: what the phases ask, by knots.
         clearance: (n+1, 4) least height [m] of each foot's centre.

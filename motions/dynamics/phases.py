@@ -48,8 +48,7 @@ class Phase:
     """A span of time in which the same feet stand.
 
     Attributes:
-        duration: [s].
-        stance: the feet that stand.
+        duration, stance: [s], and the feet that stand.
         body: x, y, z [m], roll, pitch, yaw [rad] of the trunk at the end, as offsets from where the
             problem starts; ``None`` leaves it free, as in flight.
         feet: of feet that are in the air: where they are at the end [m], relative to where they
@@ -128,8 +127,7 @@ class Tolerance:
     """How far a plan may be from what was asked before it counts as none.
 
     Attributes:
-        position: [m]; 50 mm unless said otherwise.
-        angle: [rad]; 8 deg unless said otherwise.
+        position, angle: [m], 50 mm, and [rad], 8 deg unless said otherwise.
     """
 
     position: float = 0.05

@@ -117,8 +117,7 @@ class Reading:
         value: the worst.
         limit: what it must not exceed, at least 0.
         unit: of both.
-        subject: whose it is.
-        time: when [s].
+        subject, time: whose it is, and when [s].
     """
 
     name: str

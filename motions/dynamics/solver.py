@@ -65,8 +65,7 @@ class Solved:
     """A problem and its plan, from which the search for another of the same phases may begin.
 
     Attributes:
-        problem: what was asked.
-        plan: what was found.
+        problem, plan: what was asked, and what was found.
     """
 
     problem: PhaseProblem

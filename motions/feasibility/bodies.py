@@ -181,10 +181,8 @@ class LinkHull:
     """The hull of one link.
 
     Attributes:
-        name: "trunk", or leg and part.
-        joint: Pinocchio's number of the joint that carries it.
-        corners: (k, 3) in that joint's frame [m].
-        box: (8, 3) corners of the box around them.
+        name, joint: "trunk", or leg and part, and Pinocchio's number of the joint that carries it.
+        corners, box: (k, 3) in that joint's frame [m], and (8, 3) those of the box around them.
     """
 
     name: str

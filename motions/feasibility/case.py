@@ -48,12 +48,10 @@ class Case:
     """A movement that is judged.
 
     Attributes:
-        path: the movement.
-        forces: that it takes.
+        path, forces: the movement, and what it takes.
         model: the robot that it was planned for.
         heavy: the robot that does it, with the load of the world.
-        world: with the worst of what is uncertain.
-        limits: what must be kept.
+        world, limits: with the worst of what is uncertain, and what must be kept.
     """
 
     path: Trajectory

@@ -47,8 +47,7 @@ class CheckedMotion:
     """A checked motion, with what the check worked out on its way.
 
     Attributes:
-        plan: what was checked.
-        report: what the check says.
+        plan, report: what was checked, and what the check says.
         path: the movement of the whole robot, in the frame of the motion.
         forces: contact forces and torques along it.
         robot: name of the profile of the robot that was judged.
@@ -154,8 +153,7 @@ class FeasibilityChecker:
     model of a control loop that runs.
 
     Attributes:
-        model: the robot.
-        world: in which motions are checked.
+        model, world: the robot, and in which world motions are checked.
     """
 
     @typed()

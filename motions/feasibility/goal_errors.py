@@ -27,8 +27,7 @@ class Misses:
 
     Attributes:
         times: (k,) after the start of the span [s].
-        away: (k, 5) distances [m].
-        turned: (k, 5) angles [rad]; of the trunk only.
+        away, turned: (k, 5) distances [m], and angles [rad], of the trunk only.
     """
 
     times: Float[np.ndarray, " k"]
@@ -89,8 +88,7 @@ class Departure:
         place: greatest distance [m] of the trunk, or of a foot that lands, from what was written.
         subject: of what.
         place_time: when [s].
-        angle: greatest angle [rad] of the trunk from what was written.
-        angle_time: when [s].
+        angle, angle_time: greatest angle [rad] of the trunk from what was written, and when [s].
         lag: how late [s] the trunk is as a whole; below 0, early.
     """
 

@@ -44,8 +44,7 @@ class Rise:
 
     Attributes:
         unit: margin, in its own unit, up to which the curve is over the margin itself; above 0.
-        centre: ``asinh(margin / unit)`` with an even chance.
-        width: of the rise; above 0.
+        centre, width: ``asinh(margin / unit)`` with an even chance; of the rise, above 0.
     """
 
     unit: float
@@ -134,11 +133,8 @@ class Finding:
     """The worst instant of one subject under one check; a negative ``margin`` breaks the limit.
 
     Attributes:
-        check: which limit.
-        time: when [s] it is worst.
-        subject: joint, foot or body part.
-        value, limit, margin: in ``unit``.
-        unit: of these numbers.
+        check, time, subject: which limit, when [s] it is worst, and joint, foot or body part.
+        value, limit, margin, unit: the numbers, and their unit.
         note: what else there is to say.
     """
 
@@ -253,8 +249,7 @@ class FeasibilityReport:
     """Whether the robot can do a motion, and by how much.
 
     Attributes:
-        motion: its name.
-        duration: its length [s].
+        motion, duration: its name, and its length [s].
         series: every check over the whole motion, causes before what follows from them: what no
             joint angles can do, then what the joints and the ground forbid, then balance, then
             speed, then the forces.

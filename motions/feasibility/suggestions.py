@@ -34,11 +34,9 @@ class Suggestion:
 
     Attributes:
         kind: "tempo", "amplitude", "height", "shift time", "jump" or "tempo and amplitude".
-        call: what to append to the motion, as Python.
-        meaning: the same in words.
+        call, meaning: what to append to the motion, as Python and in words.
         change: how large it is, as a share of the largest of its kind that is tried.
-        motion: the changed motion.
-        report: what the check says of it.
+        motion, report: the changed motion, and what the check says of it.
     """
 
     kind: str

@@ -131,10 +131,8 @@ class Rhythm:
     """When the steps of a stretch are.
 
     Attributes:
-        rounds: how many.
-        period: of each [s].
-        before: time [s] on four feet before the first step.
-        over: of all of it [s].
+        rounds, period: how many, and [s] of each.
+        before, over: time [s] on four feet before the first step, and of all of it.
     """
 
     rounds: int

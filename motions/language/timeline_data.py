@@ -123,9 +123,7 @@ class TimelineData:
     """An authored motion.
 
     Attributes:
-        entry: posture in which it starts.
-        exit: posture in which it ends.
-        name: what to call it.
+        entry, exit, name: postures in which it starts and ends, and what to call it.
         balance: whether the body moves over the standing feet before one is raised.
         shift_time: how long [s] that takes, before a tempo is set.
         shift_beats: how many beats it takes with a tempo; 0 without one.
@@ -135,8 +133,7 @@ class TimelineData:
             nearest motion that it can.
         tolerance: how far what is solved may be from what is asked.
         longest: how long [s] it may become: a slip of the pen is no motion of a day.
-        keys: what was written so far.
-        cursor: when [s] the next call starts.
+        keys, cursor: what was written so far, and when [s] the next call starts.
         clock: what one unit of ``over`` lasts, here and later.
         last_start: when [s] the last call's move starts.
         floor: the cursor does not fall behind this time [s] after ``also``.

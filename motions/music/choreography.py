@@ -53,13 +53,11 @@ class Dance:
     """A dance, written.
 
     Attributes:
-        timeline: the motion; it starts with the song.
-        moves: what is done, in order.
+        timeline, moves: the motion, which starts with the song, and what is done, in order.
         accents: what shall happen on the beats, by pulses of the dance.
         pulses: instants [s] of the pulses in the song; the first one is counted in, without an
             accent.
-        bar: pulses of a bar.
-        downbeat: number of the first pulse that begins one.
+        bar, downbeat: pulses of a bar, and number of the first pulse that begins one.
     """
 
     timeline: Timeline

@@ -82,9 +82,7 @@ class Song:
     """A sound with its beats.
 
     Attributes:
-        name: for a person.
-        samples: amplitudes from -1 to 1, ``rate`` a second.
-        rate: samples per second.
+        name, samples, rate: for a person; amplitudes from -1 to 1; samples per second.
         beats: instants [s] of its beats.
     """
 

@@ -178,10 +178,8 @@ class Stepping:
     """What is known of a stretch in which feet step, at n instants.
 
     Attributes:
-        times: increasing, evenly [s].
-        p_com: (n, 3) where the CoM would be [m].
-        stance: (n, 4) feet that stand.
-        p_feet: (n, 4, 3) where the feet are [m].
+        times, p_com: increasing, evenly [s]; (n, 3) where the CoM would be [m].
+        stance, p_feet: (n, 4) feet that stand, and (n, 4, 3) where the feet are [m].
         gravity: [m/s^2].
         bias: (n, 2) zero-moment point less that of the pendulum [m].
     """

@@ -127,8 +127,7 @@ class SpanSamples:
     Attributes:
         q, v: (k, 19), (k, 18) states, between the knots as the solver steps.
         a: (k, 18) accelerations.
-        tau: (k, 12) torques [N m].
-        forces: (k, 4, 3) of the ground on the feet [N].
+        tau, forces: (k, 12) torques [N m], (k, 4, 3) forces of the ground on the feet [N].
         v_motors: (k, 12) joint speeds [rad/s] at which the motors must give the torques: of those
             at both ends of the step, through which a torque holds, the one at which they give less.
     """
@@ -228,8 +227,7 @@ class PlanSamples(Wanted):
     """The part of many references that says where the robot shall be.
 
     Attributes:
-        times: (n,) [s].
-        stance: (n, 4) feet that stand.
+        times, stance: (n,) [s], (n, 4) feet that stand.
         normal_force_max: (n, 4) greatest normal force [N] of each foot.
     """
 
@@ -271,8 +269,7 @@ class CompiledPlan(MotionPlan):
             the others in the air follow their joints.
         ramp: time [s] over which a foot is unloaded before lift-off and loaded after touchdown.
         problems: what could not be done as written.
-        spans: start and end [s] of the named holds.
-        beats: instants [s] that it counts in.
+        spans, beats: start and end [s] of the named holds, and instants [s] that it counts in.
         dynamic: its parts that obey the whole robot's dynamics.
         held: by the names of spans, the foot that must be held up then; see ``held_feet``.
     """

@@ -65,8 +65,7 @@ class Piece:
     """A part of a motion, from rest to rest.
 
     Attributes:
-        first, last: rows of its path.
-        start, end: when [s] in the motion.
+        first, last, start, end: rows of its path, and when [s] in the motion.
     """
 
     first: int

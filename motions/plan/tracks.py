@@ -132,9 +132,7 @@ class Instants:
     """Where trunk and feet are at n increasing instants.
 
     Attributes:
-        times: (n,) [s].
-        p_base: (n, 3) place of the base [m].
-        R: (n, 3, 3) its attitude.
+        times, p_base, R: (n,) [s], (n, 3) place of the base [m], (n, 3, 3) its attitude.
         ground: where the feet stand.
     """
 

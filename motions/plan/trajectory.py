@@ -44,10 +44,8 @@ class Trajectory:
         times: (n,) [s].
         q: (n, 19) position, quaternion, joints. v, a: (n, 18) its velocity and acceleration, both
             of the base in its own frame.
-        rpy: (n, 3) roll, pitch, yaw [rad] of the trunk.
-        p_com: (n, 3) CoM [m].
-        stance: (n, 4) feet that stand.
-        load_share: (n, 4) share of its load that a foot may bear.
+        rpy, p_com: (n, 3) roll, pitch, yaw [rad] of the trunk, and (n, 3) CoM [m].
+        stance, load_share: (n, 4) feet that stand, and share of its load that each may bear.
         p_feet: (n, 4, 3) where the feet are [m] of legs that do not follow their joints.
         miss: (n, 4) distance [m] by which such a foot is out of its leg's reach.
         is_dynamic: (n,) instants in spans that obey the whole robot's dynamics, of which they are.

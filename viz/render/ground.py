@@ -34,8 +34,7 @@ class Grid(NamedTuple):
     """Heights of a rectangle of ground.
 
     Attributes:
-        x, y: of the middle of its first cell [m].
-        cell: side of a cell [m].
+        x, y, cell: of the middle of its first cell, and side of a cell [m].
         z: heights [m] of the cells along x and y, nan where none is known.
     """
 

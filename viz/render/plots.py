@@ -236,8 +236,7 @@ class Relation:
     """An outcome over one parameter, or two.
 
     Attributes:
-        over: the parameters.
-        outcome: what depends on them.
+        over, outcome: the parameters, and what depends on them.
         is_rate: it is a share of the runs, 0 to 1.
         labels: the bins of each parameter, in words.
         stats: mean, both ends of its 95 % interval, and number of runs, in each bin.

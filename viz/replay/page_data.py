@@ -38,8 +38,7 @@ class Link(NamedTuple):
 
     Attributes:
         name, parent: of it and of the link that it hangs on, ``world`` for the base.
-        p: (n, 3) its place in the parent's frame [m].
-        quaternion: (n, 4) its orientation there, x y z w.
+        p, quaternion: (n, 3), (n, 4) its place [m] and orientation x y z w in the parent's frame.
     """
 
     name: str

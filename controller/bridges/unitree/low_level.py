@@ -148,8 +148,7 @@ class CommandGate:
 
     Attributes:
         is_open: whether low-level commands may take the robot over.
-        accepted: number of good commands.
-        refused: number of refused ones by reason.
+        accepted, refused: number of good commands, and of refused ones by reason.
     """
 
     def __init__(

@@ -36,8 +36,7 @@ class TruthRecording:
         tau_asked: those that the command asked for when the tick began [N m], before the motors'
             limits; 0 in a row that no command led to.
         foot_forces: normal forces [N] on the feet.
-        p_world_com: centre of mass [m], by MuJoCo.
-        p_world_feet: centres of the feet [m].
+        p_world_com, p_world_feet: centres of mass and of the feet [m], by MuJoCo.
         p_world_contacts: contact points of the feet [m], nan in the air.
         v_world_contacts: tangential velocity [m/s] of the feet's material there, 0 in the air.
         trunk_force: normal force [N] between the trunk and the ground.

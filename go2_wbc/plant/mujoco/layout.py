@@ -93,8 +93,7 @@ class MujocoLayout:
 
     Attributes:
         base: id of the base body, the one with the free joint.
-        base_q: the free joint's 7 entries of ``qpos``.
-        base_v: its 6 entries of ``qvel``.
+        base_q, base_v: the free joint's 7 entries of ``qpos``, and 6 of ``qvel``.
         joint_q: entries of ``qpos`` in the order of ``JOINT_NAMES``.
         joint_v: entries of ``qvel``, likewise.
         motors: entries of ``ctrl``, likewise.

@@ -85,8 +85,7 @@ class DrawnShape(NamedTuple):
 
     Attributes:
         joint: that moves it; empty for the trunk.
-        link: name of its body.
-        mesh: name of its mesh.
+        link, mesh: names of its body and its mesh.
         T_base_shape: its pose in the base frame when all joints are at 0.
     """
 
