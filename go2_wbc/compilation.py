@@ -32,8 +32,8 @@ from typing import Any, TypeVar, cast, overload
 
 import numpy as np
 
-from go2_wbc.kept_code import Foreign, Written
 from go2_wbc.records import Record
+from go2_wbc.written import Foreign, Written
 
 __all__ = [
     "Foreign",

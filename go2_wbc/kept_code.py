@@ -21,13 +21,12 @@ import os
 import pickle
 import platform
 import tempfile
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
-from functools import cache, update_wrapper
+from functools import cache
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
-from typing import Annotated, Any, TypeVar
+from typing import Any
 
 import llvmlite.binding
 import numba
@@ -38,50 +37,7 @@ from numba.core.registry import cpu_target
 from numba.core.runtime import _nrt_python  # pyright: ignore[reportAttributeAccessIssue]
 from numba.core.serialize import dumps
 
-T = TypeVar("T")
-
-FOREIGN = "foreign"
-Foreign = Annotated[T, FOREIGN]
-"""An array that is only read, and may come from elsewhere: read-only, or with gaps."""
-
-
-class Written(ABC):
-    """A function that is compiled.
-
-    Attributes:
-        python: the function as others call it.
-        written: the function itself; a type checker may be around it.
-        nogil: whether other threads run meanwhile.
-    """
-
-    __name__: str
-
-    def __init__(self, function: Callable[..., Any], *, nogil: bool = False) -> None:
-        """Nothing is looked at before it is needed: importing a module takes no time."""
-        self.python = function
-        self.written: Any = inspect.unwrap(function)
-        self.nogil = nogil
-        update_wrapper(self, function)
-
-    @property
-    def name(self) -> str:
-        """Module and function."""
-        return f"{self.written.__module__}.{self.written.__qualname__}"
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """The names of its parameters."""
-        return self.written.__code__.co_varnames[: self.written.__code__.co_argcount]
-
-    @property
-    @abstractmethod
-    def signature(self) -> Any:
-        """As Numba has it."""
-
-    def __call__(self, *arguments: Any) -> Any:
-        """The Python."""
-        return self.python(*arguments)
-
+from go2_wbc.written import Written
 
 _log = logging.getLogger(__name__)
 

@@ -20,8 +20,9 @@ import numba
 from jaxtyping import AbstractArray
 from numba import types
 
-from go2_wbc.kept_code import FOREIGN, KeptCode, Written
+from go2_wbc.kept_code import KeptCode
 from go2_wbc.records import Record, layout_of
+from go2_wbc.written import FOREIGN, Written
 
 
 def signature_of(routine: Written) -> Any:

@@ -35,6 +35,7 @@ LAYER = frozenset(
         "numba_extensions",
         "records",
         "validation",
+        "written",
     )
 )
 """How functions are compiled and what they are handed: files below every call, not drawn."""
