@@ -15,8 +15,7 @@ import numpy as np
 
 from controller import GO2Controller
 from controller.cli.common import ExitCode, ProgressLine, Subparsers, add_parser
-from controller.demo.run import DemoProgress, run_demo
-from controller.demo.steps import StepResult
+from controller.demo.steps import DemoProgress, StepResult, run_demo
 from go2_wbc.compilation import Kernel, all_kernels, call_plain, load_kernels
 from go2_wbc.plant import MujocoPlant
 

@@ -17,7 +17,7 @@ from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from motions import CheckedMotion, CompiledPlan, FeasibilityReport, Finding
 from motions.authoring import Choice, Parameter
-from motions.dynamics.projection import PlanTarget
+from motions.dynamics.solver import PlanTarget
 from motions.feasibility import Series
 from motions.plan.trajectory import as_written
 from viz.content import CENTRE_OF_MASS, Annotation, MarginCurve, ReplayContent, Slider, Verdict

@@ -52,7 +52,6 @@ UNCHECKED = frozenset(
         "go2_wbc.curves",
         "go2_wbc.brief",
         "go2_wbc.compilation",  # loaded here, as is what it imports
-        "go2_wbc.kept_code",
         "go2_wbc.machine_code",
         "go2_wbc.numba_extensions",
         "go2_wbc.records",

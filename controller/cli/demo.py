@@ -31,8 +31,7 @@ from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.files import checked_output, write_atomically
 
 if TYPE_CHECKING:
-    from controller.demo.run import DemoProgress
-    from controller.demo.steps import DemoReport, DemoTotals, Measurement, StepResult
+    from controller.demo.steps import DemoProgress, DemoReport, DemoTotals, Measurement, StepResult
     from controller.go2_controller import GO2Controller
     from go2_wbc.recording import Recording
 
@@ -182,8 +181,7 @@ def checked_paths(folder: Path) -> list[Path]:
 
 
 def _perform(output: Output, robot: Robot, control: Control) -> tuple[DemoReport, Recording]:
-    from controller.demo.run import run_demo
-    from controller.demo.steps import DEMO_STEPS, TERRAINS, terrain_steps
+    from controller.demo.steps import DEMO_STEPS, TERRAINS, run_demo, terrain_steps
 
     steps = DEMO_STEPS if robot.terrain is None else terrain_steps(TERRAINS[robot.terrain])
     with ProgressLine() as line:

@@ -40,7 +40,7 @@ from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.description import RobotDescription
 from go2_wbc.robot.model import RobotModel
 from motions.batch_kinematics import attitudes
-from motions.feasibility.case import Case
+from motions.feasibility.forces import Case
 from motions.feasibility.report import Series
 from motions.plan.trajectory import Trajectory
 

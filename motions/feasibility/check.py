@@ -26,7 +26,7 @@ from motions.dynamics.phases import Progress
 from motions.feasibility import dynamic_spans, kinematic, tracking
 from motions.feasibility import forces as dynamics
 from motions.feasibility.bodies import SelfCollision, hulls_of, self_distance
-from motions.feasibility.case import Case, Forces
+from motions.feasibility.forces import Case, Forces
 from motions.feasibility.goal_errors import departure_measurements, departures
 from motions.feasibility.report import FeasibilityReport, Series
 from motions.language.timeline import Timeline

@@ -21,8 +21,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 from motions.dynamics.dynamic_trajectory import BALANCING_FEET, centred, feet_at
 from motions.dynamics.plan_audit import defects, drift
-from motions.feasibility.case import FEET, JOINTS, Case, Forces
-from motions.feasibility.forces import PRESSED
+from motions.feasibility.forces import FEET, JOINTS, PRESSED, Case, Forces
 from motions.feasibility.goal_errors import Misses, misses_of
 from motions.feasibility.report import Series
 from motions.plan.compiled_plan import LEAST_FEET, CompiledPlan, DynamicSpan

@@ -14,7 +14,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from motions.dynamics.dynamic_trajectory import feet_at
 from motions.dynamics.phases import PhaseProblem
-from motions.dynamics.projection import PlanTarget
+from motions.dynamics.solver import PlanTarget
 from motions.plan.compiled_plan import CompiledPlan, DynamicSpan, attitude_angles
 
 SUBJECTS = ("trunk", *FOOT_NAMES)

@@ -19,7 +19,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from motions.batch_kinematics import attitudes, foot_centres
 from motions.feasibility.bodies import LinkHulls
-from motions.feasibility.case import FEET, JOINTS, Case
+from motions.feasibility.forces import FEET, JOINTS, Case
 from motions.feasibility.report import Series
 from motions.plan.trajectory import Trajectory
 from motions.postures import home_poses

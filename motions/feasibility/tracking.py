@@ -29,10 +29,10 @@ from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.world import World
-from motions.feasibility.case import Case
 from motions.feasibility.forces import (
     TRUNK,
     VISCOUS,
+    Case,
     errors_of,
     joint_friction,
     lost,

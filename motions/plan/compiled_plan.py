@@ -27,7 +27,7 @@ from go2_wbc.tracking.plan_curves import CURVES, PlanCurves, StanceLoad
 from motions.batch_kinematics import Wanted, attitudes
 from motions.dynamics.dynamic_trajectory import BALANCING_FEET, DynamicTrajectory, sampled
 from motions.dynamics.phases import PhaseProblem, Tolerance
-from motions.dynamics.projection import PlanTarget
+from motions.dynamics.solver import PlanTarget
 from motions.postures import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN
 
 

@@ -30,7 +30,7 @@ from motions.dynamics.dynamic_trajectory import DynamicTrajectory
 from motions.dynamics.knots import standing
 from motions.dynamics.phases import PhaseProblem, Progress
 from motions.dynamics.plan_cache import nearest_cached, solve_cached
-from motions.dynamics.projection import PlanTarget
+from motions.dynamics.solver import PlanTarget
 from motions.language.dynamic_blocks import away_from_home
 from motions.language.keys import BalanceShift, BodyKey, FootHold, Key, Mark, PhaseKey
 from motions.language.timeline import Timeline

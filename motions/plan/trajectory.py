@@ -28,7 +28,7 @@ from motions.batch_kinematics import (
     place,
     rates,
 )
-from motions.dynamics.projection import PlanTarget
+from motions.dynamics.solver import PlanTarget
 from motions.plan.compiled_plan import CompiledPlan, DynamicSpan, PlanSamples
 from motions.plan.tracks import sample_times
 from motions.postures import standing_feet

@@ -132,7 +132,7 @@ def _as_in_mjcf(path: str, empty: RobotVisuals) -> RobotVisuals:
     Where its bodies have their frames is its author's choice: shapes are placed as they lie when
     all joints are at 0, which means the same in both.
     """
-    from go2_wbc.plant.mujoco.visuals import drawn_shapes
+    from go2_wbc.plant.mujoco.model import drawn_shapes
 
     meshes, shapes = drawn_shapes(path)
     data = empty.model.createData()

@@ -23,8 +23,8 @@ from jaxtyping import Float
 from go2_wbc.arguments import typed
 from go2_wbc.errors import CommandError, ConfigError, DescriptionError, ModelMismatch, unknown_name
 from go2_wbc.files import write_atomically
-from go2_wbc.kept_code import kernel_folder
 from go2_wbc.legs import LEGS
+from go2_wbc.machine_code import kernel_folder
 from go2_wbc.plant.mujoco.forces import Push
 from go2_wbc.plant.mujoco.layout import MujocoLayout, find_layout, foot_geoms
 from go2_wbc.plant.mujoco.model import (

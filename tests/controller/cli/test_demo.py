@@ -367,7 +367,7 @@ def test_of_what_a_search_says_the_first_answer_stays_on_a_terminal(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """It was cut to the terminal's width and gone after a tenth of a second."""
-    from motions.dynamics.search import _log
+    from motions.dynamics.shooting_problem import _log
 
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     with ProgressLine() as line:

@@ -11,7 +11,7 @@ from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline, deg
 from motions.dynamics import DynamicTrajectory, Tolerance, audit
-from motions.dynamics.projection import PlanTarget, _knots, _lag, nearest
+from motions.dynamics.solver import PlanTarget, _knots, _lag, nearest
 from motions.plan.trajectory import trajectory_of
 
 WIDE = Tolerance(0.1, math.radians(15.0))
