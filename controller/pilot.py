@@ -11,23 +11,11 @@ import threading
 from collections.abc import Callable
 from functools import partial
 
+from controller import modes
 from controller.acceptance import Acceptance
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.standing import Standing
-from controller.modes import (
-    LYING_HEIGHT,
-    Aborted,
-    Measurements,
-    Mode,
-    base_height,
-    is_standing,
-    listed,
-    lying,
-    sitting,
-    standing,
-    told,
-    why_not_standing,
-)
+from controller.modes import Aborted, Measurements, Mode
 from controller.navigation import Goal
 from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
@@ -125,13 +113,13 @@ class Pilot:
             return self.stand()
         loop = self._loop
         self._runner.advance_until(lambda: bool(loop.state.feet_in_contact.all()), LOOK_TIME)
-        if why_not := self._runner.between_ticks(lambda: why_not_standing(loop.snapshot)):
+        if why_not := self._runner.between_ticks(lambda: modes.why_not_standing(loop.snapshot)):
             raise Aborted(f"the robot does not stand: {why_not}", self._runner.measurements())
         return self._rise(Posture.STAND, 1.2)
 
     def _rise(self, entry: Posture, duration: float) -> Measurements:
         self._take_posture(self._make_standing(entry, duration))
-        if self._runner.settles(is_standing):
+        if self._runner.settles(modes.is_standing):
             return self._arrive(Posture.STAND)
         # It stands on other ground than it believed in as it began: feet slid, or left a box.
         self._runner.stop_stepping()
@@ -271,9 +259,9 @@ class Pilot:
         if was_halted:
             raise Aborted(f"{goal.name} ended by stop()", measured)
         if blocked:
-            raise Aborted(f"{goal.name} ended: {blocked}; {listed(measured)}", measured)
-        if why := told(goal.errors(loop.state)):
-            raise Aborted(f"{goal.name} missed: {why}; {listed(measured)}", measured)
+            raise Aborted(f"{goal.name} ended: {blocked}; {modes.listed(measured)}", measured)
+        if why := modes.told(goal.errors(loop.state)):
+            raise Aborted(f"{goal.name} missed: {why}; {modes.listed(measured)}", measured)
         return measured
 
     def halt(self) -> bool:
@@ -374,13 +362,13 @@ class Pilot:
 
     @property
     def _is_on_the_ground(self) -> bool:
-        return base_height(self._loop.snapshot) < LYING_HEIGHT
+        return modes.base_height(self._loop.snapshot) < modes.LYING_HEIGHT
 
 
 _RESTING = {
-    Posture.LIE: (Mode.LYING, lying),
-    Posture.SIT: (Mode.SITTING, sitting),
-    Posture.STAND: (Mode.STANDING, standing),
+    Posture.LIE: (Mode.LYING, modes.lying),
+    Posture.SIT: (Mode.SITTING, modes.sitting),
+    Posture.STAND: (Mode.STANDING, modes.standing),
 }
 """The mode of a robot that rests in a posture, and what is asked of it then."""
 

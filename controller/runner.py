@@ -15,19 +15,11 @@ from contextlib import suppress
 from typing import NoReturn, TypeVar
 from weakref import WeakValueDictionary
 
+from controller import modes
 from controller.behaviours import Behaviour
 from controller.behaviours.standing import Standing
 from controller.loop import ControlLoop, Fault
-from controller.modes import (
-    Aborted,
-    Limited,
-    Measurements,
-    are_within,
-    listed,
-    posture_measurements,
-    standing,
-    told,
-)
+from controller.modes import Aborted, Limited, Measurements
 from controller.pacing import NOT_YET, BackgroundLog, Errands, LoopEnded, LoopHangs, Pacer, Pending
 from go2_wbc.errors import ClosedError, ModeError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant
@@ -257,8 +249,10 @@ class Runner:
         self, what: str, asked: Callable[[Snapshot], Limited], calm_time: float = CALM_TIME
     ) -> None:
         """Let time pass until what is ``asked`` has been within its limits for ``calm_time`` s."""
-        if not self.settles(lambda now: are_within(asked(now)), calm_time):
-            why = told(asked(self.loop.snapshot)) or f"not for {calm_time:g} s without a break"
+        if not self.settles(lambda now: modes.are_within(asked(now)), calm_time):
+            why = (
+                modes.told(asked(self.loop.snapshot)) or f"not for {calm_time:g} s without a break"
+            )
             raise self._aborted(f"{what} not done within {SETTLE_LIMIT:.1f} s: {why}")
 
     def settles(self, check: Callable[[Snapshot], bool], calm_time: float = CALM_TIME) -> bool:
@@ -299,7 +293,7 @@ class Runner:
         return False
 
     def _late(self, what: str, limit: float, why_not: str = "") -> Aborted:
-        parts = ", ".join(part for part in (why_not, listed(self.measurements())) if part)
+        parts = ", ".join(part for part in (why_not, modes.listed(self.measurements())) if part)
         return self._aborted(f"{what} not done within {limit:.1f} s: {parts}")
 
     @property
@@ -312,7 +306,7 @@ class Runner:
         """Wait until a robot that steps for balance stands again."""
         if self.is_stepping:
             self.until(lambda: not self.is_stepping, STEPS_LIMIT, "stand again")
-            self.settle("stand again", standing)
+            self.settle("stand again", modes.standing)
 
     def let_pass(self, seconds: float) -> None:
         """Let time pass, whatever happens in it."""
@@ -327,7 +321,7 @@ class Runner:
 
     def measurements(self) -> Measurements:
         """What is measured now."""
-        return posture_measurements(self.loop.snapshot)
+        return modes.posture_measurements(self.loop.snapshot)
 
     def _aborted(self, reason: str) -> Aborted:
         return Aborted(reason, self.measurements())

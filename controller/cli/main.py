@@ -28,18 +28,7 @@ from controller.cli.common import (
     installed_version,
 )
 from controller.pacing import REASON
-from go2_wbc.errors import (
-    CommandError,
-    ConfigError,
-    Go2WbcError,
-    IkError,
-    ModelMismatch,
-    MotionError,
-    MotionFileError,
-    QpInfeasible,
-    SolverUnavailable,
-    TimelineError,
-)
+from go2_wbc import errors
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,11 +90,14 @@ go2-wbc doctor --json    the same for a program to read
 go2-wbc COMMAND --help   the options of a command, with examples
 """
 
-EXIT_CODES: tuple[tuple[tuple[type[Go2WbcError], ...], ExitCode], ...] = (
-    ((CommandError, ConfigError, SolverUnavailable, ModelMismatch), ExitCode.USAGE),
-    ((TimelineError, MotionFileError), ExitCode.USAGE),
-    ((MotionError, QpInfeasible, IkError), ExitCode.FAILED),
-    ((Go2WbcError,), ExitCode.RUNTIME),
+EXIT_CODES: tuple[tuple[tuple[type[errors.Go2WbcError], ...], ExitCode], ...] = (
+    (
+        (errors.CommandError, errors.ConfigError, errors.SolverUnavailable, errors.ModelMismatch),
+        ExitCode.USAGE,
+    ),
+    ((errors.TimelineError, errors.MotionFileError), ExitCode.USAGE),
+    ((errors.MotionError, errors.QpInfeasible, errors.IkError), ExitCode.FAILED),
+    ((errors.Go2WbcError,), ExitCode.RUNTIME),
 )
 """The exit code of an error, of every command; the first row that fits counts."""
 
@@ -220,7 +212,7 @@ def _explained(error: BaseException) -> tuple[str, ExitCode]:
     """What to say of an error, and the exit code; a bug shows its traceback first."""
     if isinstance(error, KeyboardInterrupt):
         return "interrupted", ExitCode.INTERRUPTED
-    if isinstance(error, Go2WbcError):
+    if isinstance(error, errors.Go2WbcError):
         return str(error), next(code for kinds, code in EXIT_CODES if isinstance(error, kinds))
     if isinstance(error, ImportError) and (error.name or "").split(".")[0] not in _OURS:
         hint = f"`{PROGRAM} doctor` says what is missing and how to get it"

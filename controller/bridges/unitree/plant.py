@@ -15,17 +15,7 @@ from typing import TYPE_CHECKING, Final, final
 import numpy as np
 
 from controller.behaviours import DAMPING
-from controller.bridges.unitree import LOOPBACK, require_dds
-from controller.bridges.unitree.low_level import (
-    GuardConfig,
-    Guards,
-    as_it_says,
-    intact_message,
-    is_passive,
-    low_cmd_message,
-    require_sane,
-    sensor_reading,
-)
+from controller.bridges.unitree import LOOPBACK, low_level, require_dds
 from controller.bridges.unitree.messages import LOW_STATE, encode_message
 from controller.bridges.unitree.sport_api import SWITCHER_SERVICE, Code, SwitcherApi
 from controller.pacing import SWITCH_INTERVAL, BackgroundLog
@@ -88,7 +78,7 @@ class UnitreePlant(Plant):
         domain: int = 0,
         *,
         i_have_the_remote_in_hand: bool = False,
-        guards: GuardConfig | None = None,
+        guards: low_level.GuardConfig | None = None,
         estimator: EstimatorConfig | None = None,
     ) -> None:
         """Find the robot, make sure that it lies, and take it over from its sport service.
@@ -113,9 +103,9 @@ class UnitreePlant(Plant):
         from controller.bridges.unitree.bus import Bus
 
         model = RobotModel()
-        self._config = guards or GuardConfig()
+        self._config = guards or low_level.GuardConfig()
         self._repeat = max(REPEAT, self._config.stale_limit / REPEATS)
-        self._guards = Guards(model, self._config)
+        self._guards = low_level.Guards(model, self._config)
         # Nobody watches the sensors: how sound ones of a real robot read is not known well enough.
         self._estimator = StateEstimator(model, estimator, watches=False)
         self._model = model
@@ -176,14 +166,14 @@ class UnitreePlant(Plant):
             PlantError: if a guard trips; the robot is damped.
         """
         self._check_open()
-        require_sane(command)
+        low_level.require_sane(command)
         self._send_softened(command)
         while not self._hears_a_state():
             self._send_softened(command)
 
     def _send_softened(self, command: JointCommand) -> None:
         with self._sending:
-            if not is_passive(command):
+            if not low_level.is_passive(command):
                 self._require_sound()
             self._send(self._guards.soften(command, self._state))
 
@@ -213,8 +203,8 @@ class UnitreePlant(Plant):
 
     def _send(self, command: JointCommand) -> None:
         with self._sending:
-            self._commands.write(encode_message(low_cmd_message(command)))
-            self._written = math.inf if is_passive(command) else time.monotonic()
+            self._commands.write(encode_message(low_level.low_cmd_message(command)))
+            self._written = math.inf if low_level.is_passive(command) else time.monotonic()
 
     def _damp_once(self) -> None:
         try:
@@ -300,7 +290,7 @@ class UnitreePlant(Plant):
         known = self._tick
         for data in self._states.take():
             try:
-                message = intact_message(LOW_STATE, data)
+                message = low_level.intact_message(LOW_STATE, data)
             except CommandError:
                 self.bad_states += 1
                 continue
@@ -309,9 +299,9 @@ class UnitreePlant(Plant):
                 raise self._stop(PlantError("the robot's clock went back: it has started anew"))
             if tick > self._tick:
                 self._tick, self._heard = tick, time.monotonic()
-                reading = sensor_reading(message)
+                reading = low_level.sensor_reading(message)
                 self._state = self._estimator.update(reading)
-                self._own_view = as_it_says(self._state, reading, message)
+                self._own_view = low_level.as_it_says(self._state, reading, message)
         return self._tick > known
 
     # --- taking over ----------------------------------------------------------------------
