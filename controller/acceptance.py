@@ -36,7 +36,6 @@ class Acceptance:
     """Watches a motion while it is played, and judges it."""
 
     def __init__(self, plan: MotionPlan, plant: Plant) -> None:
-        """Watch ``plan`` on ``plant``."""
         self._plan, self._plant, self._held = plan, plant, plan.held_feet
         self._touched = 0.0
         self._heights: list[list[float]] = [[] for _ in self._held]

@@ -417,7 +417,6 @@ class GO2Controller:
         self.close()
 
     def __repr__(self) -> str:
-        """Who it is, what it does, and when."""
         plant = type(self._plant).__name__
         time = self._runner.loop.state.time
         return f"<GO2Controller {self._namespace}: {self.mode.value}, {plant}, {time:.2f} s>"

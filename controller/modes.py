@@ -63,7 +63,6 @@ class Outcome:
     __repr__ = brief
 
     def __bool__(self) -> bool:
-        """Truth of the outcome is ``ok``."""
         return self.ok
 
 

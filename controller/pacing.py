@@ -75,7 +75,6 @@ class LogOnce:
     """Writes a warning when what it is about begins, and not again until that has ended."""
 
     def __init__(self, log: logging.Logger) -> None:
-        """Write to ``log``."""
         self._log, self._level = log, 0
 
     def warn(self, level: int, message: str) -> None:
@@ -160,7 +159,6 @@ class Errands:
     """What the thread of a loop has been asked to do between its ticks."""
 
     def __init__(self) -> None:
-        """Nothing has been asked yet."""
         self._asked: SimpleQueue[_Errand] = SimpleQueue()
         self._under_way: list[_Errand] = []
         self._rounds = 0
@@ -219,7 +217,6 @@ class BackgroundLog:
     """Writes warnings in a thread of its own."""
 
     def __init__(self, warn: Callable[..., None]) -> None:
-        """Write with ``warn``, a method of a ``logging.Logger``."""
         self._warn = warn
         self._lines: SimpleQueue[tuple[str, tuple[object, ...]] | None] = SimpleQueue()
         self._thread = threading.Thread(target=self._write, name="go2-log", daemon=True)

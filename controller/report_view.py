@@ -101,7 +101,8 @@ def verdict_of(report: FeasibilityReport) -> Verdict:
         text += f", {counted(tight, 'tight margin')}"
     margins, enough = report.margins, _LEAST_SAMPLES
     judged = [s for s in report.series if len(s.times) >= enough and s.check in margins]
-    judged.sort(key=lambda item: _share_left(margins[item.check]))
+    left = {check: one.margin / max(abs(one.limit), 1e-9) for check, one in margins.items()}
+    judged.sort(key=lambda item: left[item.check])  # shares, as limits are of different units
     findings = (*report.failures, *report.warnings)
     return Verdict(
         ok=report.ok,
@@ -204,11 +205,6 @@ def _curve(series: Series) -> MarginCurve:
         worst=known.argmin(axis=1),
         tight=series.tight,
     )
-
-
-def _share_left(finding: Finding) -> float:
-    """Margin over limit: what orders limits of different units."""
-    return finding.margin / max(abs(finding.limit), 1e-9)
 
 
 def _part(run: Recording, name: str) -> Recording:

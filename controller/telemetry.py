@@ -75,7 +75,6 @@ class Telemetry:
         self.qp_failures = self.relaxed_ticks = self.grave_ticks = self.missed_deadlines = 0
 
     def __repr__(self) -> str:
-        """How many ticks, and of how many it had to give way."""
         return f"<Telemetry: {self._count} ticks, {self.relaxed_ticks} relaxed>"
 
     def record(self, snapshot: Snapshot, stance: Bool[np.ndarray, "4"], label: str) -> None:
@@ -216,7 +215,6 @@ class SeenTerrain:
         return cells(self._heights)
 
     def __repr__(self) -> str:
-        """How much of it there is, and whether the way is free."""
         z = self.points()[:, 2]
         way = f"blocked: {self.blocked}" if self.blocked else "way free"
         if not len(z):

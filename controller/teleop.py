@@ -72,7 +72,6 @@ class Gamepad:
     """
 
     def __init__(self, pygame: Any) -> None:  # noqa: ANN401 - a module of an extra
-        """Take ``pygame.joystick``'s first."""
         self._pygame, self._stick = pygame, pygame.joystick.Joystick(0)
         self._stick.init()
         self.name = str(self._stick.get_name())
@@ -155,7 +154,6 @@ class Teleop:
     """Turns keys into calls on a robot whose time passes by itself (``realtime=True``)."""
 
     def __init__(self, go2: GO2Controller) -> None:
-        """Drive ``go2``."""
         self._go2 = go2
         self._jobs = JobServer(go2)
         self._jobs.start("teleop")
@@ -205,18 +203,14 @@ class Teleop:
         state, command, mode = go2.state, go2.command, go2.mode
         doing = f"{self._doing} ..." if self.is_busy else mode.name.lower()
         if mode in (Mode.FALLEN, Mode.DAMPED) and not self.is_busy:
-            return f"{doing:<13} {self._fault()}"[:WIDTH]
+            outcome = go2.last_outcome
+            reason = "limp" if outcome.ok else outcome.reason
+            return f"{doing:<13} r recovers, 1 stands: {reason}"[:WIDTH]
         asked = (
             f"{command.linear_x:+.1f} {command.linear_y:+.1f} m/s {command.angular_z:+.1f} rad/s"
         )
         measured = f"ahead {state.v[0]:+.2f} m/s, {state.q[2]:.2f} m high"
         return f"{doing:<13} asked {asked}; {measured}"[:WIDTH]
-
-    def _fault(self) -> str:
-        """Why the robot is limp, and what brings it back."""
-        outcome = self._go2.last_outcome
-        reason = "limp" if outcome.ok else outcome.reason
-        return f"r recovers, 1 stands: {reason}"
 
     def news(self) -> list[str]:
         """What has been said since the last call."""

@@ -82,7 +82,6 @@ class Recording:
     _repr_html_ = inline_html
 
     def __repr__(self) -> str:
-        """How long, and what was done."""
         done = " ".join(label for label, _ in groupby(self.labels))
         return cut(f"Recording({len(self.time)} samples, {self.duration:.2f} s: {done})")
 

@@ -203,7 +203,6 @@ class Reference:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        """Find the feet in stance."""
         stance = np.array([task is LegTask.STANCE for task in self.legs])
         _set(self, "stance", stance)
 

@@ -132,7 +132,8 @@ def run(
     else:
         print(render(report, sys.stdout.encoding), end="\n\n", flush=True)
     try:
-        _write_data(recording, values, paths)
+        recording.save(paths[0])
+        write_atomically(paths[1], (json.dumps(values, indent=2) + "\n").encode())
         if not output.no_media:
             title = TITLE if robot.terrain is None else SEEING.format(robot.terrain)
             _write_media(recording, report, paths, title)
@@ -236,12 +237,6 @@ def _has_display() -> bool:
         reason = problem.split(" (")[0]
         print(f"go2-wbc: no viewer: {reason}; going on without it", file=sys.stderr)
     return problem is None
-
-
-def _write_data(recording: Recording, values: Mapping[str, object], paths: list[Path]) -> None:
-    """The recording and the report."""
-    recording.save(paths[0])
-    write_atomically(paths[1], (json.dumps(values, indent=2) + "\n").encode())
 
 
 def _write_media(recording: Recording, report: DemoReport, paths: list[Path], title: str) -> None:

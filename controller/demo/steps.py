@@ -48,7 +48,6 @@ class Measurement:
         return abs(self.measured - self.asked) <= self.tolerance  # False for nan
 
     def __str__(self) -> str:
-        """One line for a person."""
         text = f"{self.name} {self.measured:.3g} {self.unit}"
         if self.asked is None:
             return text

@@ -139,8 +139,9 @@ def answer(order: bytes, item: bytes) -> bytes:
     except (Exception, SystemExit) as error:
         text = traceback.format_exception_only(error)[-1].strip()
         return pickle.dumps((None, Failure(text, _told(error))))
-    finally:
-        _tidy_up()
+    finally:  # of what it has left: robots hold tens of megabytes of records, in cycles
+        gc.collect()
+        _keep_the_rest()
 
 
 def _told(error: BaseException) -> str:
@@ -151,12 +152,6 @@ def _told(error: BaseException) -> str:
             break
         trace = trace.tb_next
     return "".join(traceback.format_exception(type(error), error, trace))
-
-
-def _tidy_up() -> None:
-    """Free what the item has left: robots hold tens of megabytes of records, in cycles."""
-    gc.collect()
-    _keep_the_rest()
 
 
 _keep_the_rest = cache(gc.freeze)

@@ -67,7 +67,8 @@ def _relation(
     known = np.isfinite([values, *parameters.values()]).all(axis=0)
     values, axes = values[known], [given[known] for given in parameters.values()]
     line = len(axes) == 1
-    most = min(len(values) // PER_BIN, MOST_BINS) if line else _side(len(values))
+    along, across = len(values) // PER_BIN, math.isqrt(len(values) // PER_CELL)
+    most = min(along, MOST_BINS) if line else min(across, MOST_CELLS)
     groups, labels = zip(*(_bins(axis, max(most, 2)) for axis in axes), strict=True)
     shape = tuple(len(names) for names in labels)
     cells = np.ravel_multi_index(groups, shape)
@@ -83,10 +84,6 @@ def _relation(
         places=np.array(places),
         dots=np.column_stack([axes[0], values]) if line and not is_rate else np.zeros((0, 2)),
     )
-
-
-def _side(n: int) -> int:
-    return min(math.isqrt(n // PER_CELL), MOST_CELLS)
 
 
 def _bins(

@@ -91,7 +91,6 @@ class RobotModel:
         self._read_constants()
 
     def __repr__(self) -> str:
-        """Of which robot, and how heavy."""
         return f"<RobotModel: {self.profile.title}, {self.mass:.2f} kg>"
 
     def _read_constants(self) -> None:

@@ -47,7 +47,6 @@ class RobotState:
     feet_in_contact: Bool[np.ndarray, "4"]
 
     def __repr__(self) -> str:
-        """When and where."""
         place = ", ".join(f"{part:.3f}" for part in self.p_world_base.tolist())
         angles = ", ".join(f"{angle:.1f}" for angle in np.degrees(self.rpy).tolist())
         return f"RobotState(at {self.time:.3f} s: base ({place}) m, rpy ({angles}) deg)"

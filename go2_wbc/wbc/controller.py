@@ -177,7 +177,6 @@ class WholeBodyController:
             raise ConfigError("the placo back end has tasks of its own and takes no extra ones")
 
     def __repr__(self) -> str:
-        """With which back end and solver, and how many tasks."""
         return (
             f"<WholeBodyController: {self.backend_name}, {self._solver}, {len(self.tasks)} tasks>"
         )

@@ -54,7 +54,6 @@ class ShootingProblem:
     def __init__(
         self, knots: Knots, model: RobotModel, limits: PlanLimits, weights: Weights
     ) -> None:
-        """Build every knot's dynamics and costs."""
         self._knots, self._model, self._limits, self._weights = knots, model, limits, weights
         self.motor = model.motor.scaled(limits.torque_share)
         self.motor_at_end = model.motor.scaled(limits.end_share)

@@ -65,7 +65,6 @@ class SelfCollision:
     """
 
     def __init__(self, model: RobotModel) -> None:
-        """Take the convex bodies of ``model``; see ``geometry_of``."""
         self._model = model.pin_model
         self._data = self._model.createData()
         self.geometry = geometry_of(model.description)

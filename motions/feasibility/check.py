@@ -180,7 +180,6 @@ class FeasibilityChecker:
         self._hulls = hulls_of(self.model.description)
 
     def __repr__(self) -> str:
-        """Of which robot, in which world."""
         return f"<FeasibilityChecker: {self.model!r}, {self.world!r}>"
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -280,7 +279,9 @@ class FeasibilityChecker:
             carried = replace(case, path=_with_load(case.path, case.heavy))
         com, zero_moment_point = dynamics.support(carried)
         if carried is not case:  # the controller feels the load, and shifts the CoM back
-            com = _lesser(com, dynamics.support(case)[0])
+            own = dynamics.support(case)[0]
+            margins = np.minimum(com.margins, own.margins)
+            com = replace(com, values=np.minimum(com.values, own.values), margins=margins)
         lag, slip = dynamics.lagging(case), dynamics.slip(case)
         wrench, load = dynamics.contacts(case)
         is_off, slips = com.is_broken or lag.is_broken, slip.is_broken or lag.is_broken
@@ -348,12 +349,6 @@ def _missed(problems: Sequence[Problem], limits: FeasibilityLimits) -> list[Seri
             what = (WAY, "m", (problem.subject,), times, values, limits.reach)
             found.append(Series.against(*what, tight=limits.reach))
     return found
-
-
-def _lesser(one: Series, other: Series) -> Series:
-    """The lesser values of two series that may not fall below the same limits."""
-    values = np.minimum(one.values, other.values)
-    return replace(one, values=values, margins=np.minimum(one.margins, other.margins))
 
 
 def _failed(problem: Problem) -> Series:

@@ -148,7 +148,6 @@ class Finding:
     note: str = ""
 
     def __str__(self) -> str:
-        """One line for a person."""
         line = f"{self.check}: {self.subject} at {self.time:.2f} s"
         if np.isfinite(self.value):
             value = self.value if abs(self.value) >= NOISE else 0.0
@@ -276,7 +275,6 @@ class FeasibilityReport:
     _repr_html_ = inline_html
 
     def __repr__(self) -> str:
-        """The verdict."""
         verdict = "ok" if self.ok else f"not ok: {self.failures[0]}"
         chance = f"{self.duration:.1f} s, chance {_percent(self.probability)}"
         return cut(f"FeasibilityReport({self.motion!r}, {chance}, {verdict})")

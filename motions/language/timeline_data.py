@@ -159,7 +159,6 @@ class TimelineData:
     _repr_html_ = inline_html
 
     def __repr__(self) -> str:
-        """Its name, length and ends."""
         ends = f"{self.entry.value} to {self.exit.value}"
         return f"Timeline({self.name!r}, {self.end:.2f} s, {len(self.keys)} moves, {ends})"
 

@@ -291,7 +291,6 @@ class CompiledPlan(MotionPlan):
     _repr_html_ = inline_html
 
     def __repr__(self) -> str:
-        """Its name, length and ends."""
         ends = f"{self.entry.value} to {self.exit.value}"
         return f"CompiledPlan({self.name!r}, {self.duration:.2f} s, {ends})"
 

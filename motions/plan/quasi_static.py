@@ -117,7 +117,6 @@ class FootContacts:
     """
 
     def __init__(self, timeline: Timeline) -> None:
-        """Of the keys of ``timeline``."""
         self.swings: dict[Leg, list[tuple[float, float]]] = {leg: [] for leg in LEGS}
         for step in timeline.in_order(StepKey):
             self.swings[step.leg].append((step.start, step.end))

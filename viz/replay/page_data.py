@@ -55,7 +55,6 @@ class Pack:
     """
 
     def __init__(self) -> None:
-        """Start empty."""
         self._blobs: list[bytes] = []
         self._entries: dict[str, dict[str, object]] = {}
         self._size = 0
@@ -108,7 +107,6 @@ class SharedMesh(shapes.Geometry):
     """A geometry that refers to a row of the page's mesh table."""
 
     def __init__(self, index: int) -> None:
-        """Refer to mesh ``index``."""
         self.uuid = str(uuid.UUID(int=index))
         self._index = index
 

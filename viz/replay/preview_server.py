@@ -119,7 +119,6 @@ class PreviewServer(ThreadingHTTPServer):
         self.server_close()
 
     def __exit__(self, *_: object) -> None:
-        """Close."""
         self.close()
 
     def page(self) -> str:

@@ -52,7 +52,6 @@ class MotionActions:
     """Offers ``play_motion`` of a job server's robot."""
 
     def __init__(self, context: Any, namespace: str, jobs: Jobs) -> None:
-        """Offer the action of the robot ``namespace`` in ``context``."""
         self._jobs = jobs
         self._node = ros.Node(
             "go2_wbc_motions", namespace=namespace, context=context, start_parameter_services=False

@@ -269,7 +269,6 @@ class Guards:
     """Judges states and softens commands for one robot."""
 
     def __init__(self, model: RobotModel, config: GuardConfig) -> None:
-        """Guard ``model``'s robot."""
         self._config = config
         limits = model.pin_model
         self._lower = np.array(limits.lowerPositionLimit[7:])

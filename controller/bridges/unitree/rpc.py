@@ -88,7 +88,6 @@ class Lease:
     """Gives one client at a time the sole control of a service, as Unitree's servers do."""
 
     def __init__(self) -> None:
-        """Nobody has it."""
         self._id, self._renewed = 0, -math.inf
 
     def allows(self, request: Request) -> bool:
@@ -120,7 +119,6 @@ class Client:
     """Calls one service; one call at a time."""
 
     def __init__(self, bus: Bus, service: str) -> None:
-        """Call ``service``."""
         self._writer = bus.writer(f"rt/api/{service}/request")
         self._reader = bus.reader(f"rt/api/{service}/response", depth=QUEUE, reliable=True)
 

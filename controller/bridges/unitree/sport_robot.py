@@ -76,7 +76,6 @@ class SportRobot:
     """
 
     def __init__(self, plant: Plant, config: Config) -> None:
-        """Take over a robot that lies on the ground."""
         self._config = config = config.beside_hardware
         # With a model of its own: the loop is another thread.
         self._checker = FeasibilityChecker(RobotModel(motor=config.motor), config.feasibility)

@@ -120,7 +120,6 @@ class GroundTruth(Plant):
     """
 
     def __init__(self, plant: MujocoPlant) -> None:
-        """Record what a controller does to ``plant``."""
         self._plant = plant
         self.robot, self.joint_damping = plant.robot, plant.joint_damping
         joint = plant.model.joint(JOINT_NAMES[0])  # a file of a user may name the base otherwise

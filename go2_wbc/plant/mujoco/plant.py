@@ -435,7 +435,6 @@ class MujocoPlant(Plant):
         self._closed = True
 
     def __repr__(self) -> str:
-        """What it is, and when."""
         now = "closed" if self._closed else f"{self.time:.3f} s"
         mass = float(self._model.body_subtreemass[self._layout.base])
         return f"<MujocoPlant: {mass:.2f} kg, {now}>"

@@ -119,7 +119,6 @@ class SavedPhysics(NamedTuple):
     lidar: Mapping[str, Any] | None = None
 
     def __repr__(self) -> str:
-        """After how many ticks, and what waits."""
         return f"SavedPhysics(ticks={self.ticks}, pushes={len(self.pushes)})"
 
 
