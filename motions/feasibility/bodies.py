@@ -120,8 +120,8 @@ def self_distance(case: Case, collision: SelfCollision) -> Series:
     found = collision.nearest_along(q)
     values = np.array([[distance] for distance, _ in found])
     worst = found[int(np.argmin(values))][1]
-    what = ("self-collision", "m", (worst,), case.path.times[rows], values)
-    return Series.against(*what, case.limits.self_distance, is_floor=True)
+    what, times = ("self-collision", "m", (worst,), values), case.path.times[rows]
+    return case.series(*what, case.limits.self_distance, is_floor=True, times=times)
 
 
 def _lever_arms(model: pin.Model, body: pin.GeometryObject) -> Float[np.ndarray, "12"]:

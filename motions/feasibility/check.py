@@ -291,7 +291,7 @@ class FeasibilityChecker:
         grip = dynamics.friction(case)
         landing_place, flat_landing, landing_speed = kinematic.landing(case)
         return [
-            *_missed(problems, limits),
+            *_missed(problems, case),
             kinematic.reach(case),
             kinematic.joint_position(case),
             self_distance(case, self._collision),
@@ -340,14 +340,14 @@ def check(
     return FeasibilityChecker(world=World.of(friction, payload, world)).check(motion)
 
 
-def _missed(problems: Sequence[Problem], limits: FeasibilityLimits) -> list[Series]:
+def _missed(problems: Sequence[Problem], case: Case) -> list[Series]:
     """What else than balance is not as written; a place that a foot nearly reaches is a warning."""
     found = [_failed(problem) for problem in problems if problem.check not in (BALANCE, WAY)]
     for problem in problems:
         if problem.check == WAY:
-            times, values = np.array([problem.time]), np.full((1, 1), problem.miss)
-            what = (WAY, "m", (problem.subject,), times, values, limits.reach)
-            found.append(Series.against(*what, tight=limits.reach))
+            values, reach = np.full((1, 1), problem.miss), case.limits.reach
+            what, times = (WAY, "m", (problem.subject,), values), np.array([problem.time])
+            found.append(case.series(*what, reach, tight=reach, times=times))
     return found
 
 

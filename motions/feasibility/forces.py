@@ -123,10 +123,16 @@ class Case:
         is_floor: bool = False,
         where: Bool[np.ndarray, "#n #k"] | bool = True,
         tight: float = 0.0,
+        times: Float[np.ndarray, " n"] | None = None,
     ) -> Series:
-        """Of values at every sample of the path; see ``Series.against``."""
-        what = (check, unit, subjects, self.path.times, values, limits)
-        return Series.against(*what, is_floor=is_floor, where=where, tight=tight)
+        """Of values that may not exceed ``limits``, or fall below them; checked only ``where``.
+
+        They are those at ``times`` [s], by default at every sample of the path.
+        """
+        bounds = np.broadcast_to(limits, values.shape)
+        margins = np.where(where, values - bounds if is_floor else bounds - values, np.nan)
+        when = self.path.times if times is None else times
+        return Series(check, unit, subjects, when, values, bounds, margins, tight)
 
 
 SPREAD = 3

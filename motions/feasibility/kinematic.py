@@ -247,7 +247,7 @@ def ends(case: Case, plan: MotionPlan) -> Series:
         values[3] = np.inf
     times, own = np.array([0.0, plan.duration]), np.repeat(np.eye(2, dtype=bool), 3, axis=1)
     table = np.tile(values, (2, 1))
-    series = Series.against("entry and exit", "m, rad", names, times, table, bounds, where=own)
+    series = case.series("entry and exit", "m, rad", names, table, bounds, where=own, times=times)
     if not (series.margins[-1, 3:] < 0.0).any():
         return series
     end = plan.exit.value

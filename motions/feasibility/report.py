@@ -28,7 +28,7 @@ from textwrap import wrap
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from go2_wbc.brief import brief, counted, cut, inline_html
 from go2_wbc.errors import MotionInfeasible
@@ -180,25 +180,6 @@ class Series:
     note: str = ""
 
     __repr__ = brief
-
-    @staticmethod
-    def against(
-        check: str,
-        unit: str,
-        subjects: tuple[str, ...],
-        times: Float[np.ndarray, " n"],
-        values: Float[np.ndarray, "n k"],
-        limits: Float[np.ndarray, "*some"] | float,
-        *,
-        is_floor: bool = False,
-        where: Bool[np.ndarray, "#n #k"] | bool = True,
-        tight: float = 0.0,
-    ) -> Series:
-        """Of values that may not exceed ``limits``, or fall below them; checked only ``where``."""
-        bounds = np.broadcast_to(limits, values.shape)
-        left = values - bounds if is_floor else bounds - values
-        margins = np.where(where, left, np.nan)
-        return Series(check, unit, subjects, times, values, bounds, margins, tight)
 
     @property
     def is_broken(self) -> bool:
