@@ -92,8 +92,7 @@ def _off_curves(
     recorded: TruthRecording, plan: MotionPlan, anchor: Anchor, solved: Bool[np.ndarray, " n"]
 ) -> Float[np.ndarray, "4"]:
     """Trunk and feet against the plan's curves, where no part is solved."""
-    rows = np.flatnonzero(~solved[::STRIDE]) * STRIDE
-    truth = recorded.part(rows)
+    truth = recorded.part(np.flatnonzero(~solved[::STRIDE]) * STRIDE)
     asked = placed(plan, truth.time - recorded.time[0], anchor)
     trunk, turned = trunk_off(asked, truth), turned_off(asked, truth)
     stance = asked["legs"] == STANCE

@@ -8,7 +8,6 @@ procedures into calls.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from functools import partial
 
 from controller import modes
@@ -27,7 +26,6 @@ from go2_wbc.errors import DynamicMotionRefused, ModeError, StanceMismatch
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.trunk import LEVEL, BodyPose
-from go2_wbc.plant import Plant
 from motions.postures import lie_down, rise, sit_down, sit_raise
 
 READY_TIME = 0.2  #: Time [s] that a robot is given to stand ready in walking mode
@@ -43,6 +41,8 @@ class Pilot:
         mode, playing: what the robot is doing; the behaviour that plays a motion, or None.
         runner: lets time pass; ``runner.loop`` has the newest state and the telemetry.
         close: go limp and stop; the plant stays open. Idempotent.
+        collapse: goes limp at once, for a reason; ends the procedure that runs, from any thread.
+        excess: how far a command is beyond what is followed (0 if not, 2 by far), and in words.
     """
 
     def __init__(self, runner: Runner, config: Config) -> None:
@@ -51,6 +51,7 @@ class Pilot:
         self.close: Callable[[], None] = runner.close
         self._loop, self._config = runner.loop, config
         self._walker = Walker(runner, config)
+        self.excess, self.collapse = self._walker.excess, runner.interrupt
         self._goal: Goal | None = None
         self._commands = threading.Lock()  # held to take one, and to begin what takes none
         self.playing: PlayPlan | None = None
@@ -70,10 +71,6 @@ class Pilot:
     def command(self) -> VelocityCommand:
         """The velocity command that is being followed."""
         return self._walker.command if self.mode is Mode.WALKING else ZERO_COMMAND
-
-    def excess(self, command: VelocityCommand) -> tuple[int, str]:
-        """How far ``command`` is beyond what is followed (0 if not, 2 by far), and in words."""
-        return self._walker.excess(command)
 
     @property
     def terrain(self) -> SeenTerrain | None:
@@ -293,8 +290,13 @@ class Pilot:
         plant = self._loop.plant
         if stands_up:
             self._ensure_standing()
-        if not allow_dynamic:
-            _refuse_dynamic_on_hardware(plan, plant)
+        if plan.is_dynamic and plant.is_hardware and not allow_dynamic:
+            raise DynamicMotionRefused(
+                f"motion {plan.name!r} is dynamic: fewer than three feet carry the robot in parts "
+                f"of it, so it cannot be stopped there, and {type(plant).__name__} may move a "
+                "robot. No dynamic motion of this project was tried on one. To play it all the "
+                "same: play(..., allow_dynamic=True)"
+            )
         self._meet_entry(plan)
         behaviour = PlayPlan(plan, self._config.wbc.joint_friction)
         acceptance = Acceptance(plan, plant)
@@ -347,10 +349,6 @@ class Pilot:
 
     # --- helpers --------------------------------------------------------------------------
 
-    def collapse(self, reason: str) -> None:
-        """Go limp at once; ends the procedure that runs. Any thread may call it."""
-        self._runner.interrupt(reason)
-
     def wait(self, seconds: float) -> Measurements:
         """Let time pass, whatever happens in it; a fault ends up in ``mode``."""
         known_fault = self._loop.fault
@@ -371,14 +369,3 @@ _RESTING = {
     Posture.STAND: (Mode.STANDING, modes.standing),
 }
 """The mode of a robot that rests in a posture, and what is asked of it then."""
-
-
-def _refuse_dynamic_on_hardware(plan: MotionPlan, plant: Plant) -> None:
-    """Raise ``DynamicMotionRefused`` for a dynamic plan on a plant that may be a robot."""
-    if plan.is_dynamic and plant.is_hardware:
-        raise DynamicMotionRefused(
-            f"motion {plan.name!r} is dynamic: fewer than three feet carry the robot in parts "
-            f"of it, so it cannot be stopped there, and {type(plant).__name__} may move a "
-            "robot. No dynamic motion of this project was tried on one. To play it all the "
-            "same: play(..., allow_dynamic=True)"
-        )

@@ -278,7 +278,8 @@ class Runner:
     ) -> None:
         """Let time pass until ``is_done()``, for ``limit`` seconds at most; tells ``why_not``."""
         if not self._comes(is_done, limit):
-            raise self._late(what, limit, why_not())
+            said = ", ".join(filter(None, (why_not(), modes.listed(self.measurements()))))
+            raise self._aborted(f"{what} not done within {limit:.1f} s: {said}")
 
     def _comes(self, is_done: Callable[[], bool], limit: float) -> bool:
         """Whether ``is_done()`` came within ``limit`` seconds; a fault is raised."""
@@ -291,10 +292,6 @@ class Runner:
         if fault is not None:
             raise self._aborted(fault.reason)
         return False
-
-    def _late(self, what: str, limit: float, why_not: str = "") -> Aborted:
-        parts = ", ".join(part for part in (why_not, modes.listed(self.measurements())) if part)
-        return self._aborted(f"{what} not done within {limit:.1f} s: {parts}")
 
     @property
     def is_stepping(self) -> bool:

@@ -98,10 +98,7 @@ class Walker:
         return GaitChoice(self._config.envelope) if gait == AUTO else None
 
     def _envelope_of(self, walking: Walking) -> VelocityEnvelope:
-        choice = walking.choice
-        if choice is not None:
-            return choice.envelope
-        return self._widest(walking.gait)
+        return walking.choice.envelope if walking.choice else self._widest(walking.gait)
 
     def _widest(self, gait: Gait) -> VelocityEnvelope:
         return envelope_of(gait, self._config.envelope, self._runner.loop.model.profile)

@@ -216,6 +216,24 @@ class JointCommand:
         """Torques [N m] asked for at angles ``q`` and velocities ``v``, before any limit."""
         return self.kp * (self.q_des - q) + self.tau + self.kd * (self.v_des - v)
 
+    def numbers(self) -> Float[np.ndarray, "5 12"]:
+        """All of it, in the order above.
+
+        Raises:
+            CommandError: for a value that is not finite, or an array of another shape.
+        """
+        names = self.__dataclass_fields__
+        rows = [getattr(self, name) for name in names]
+        for name, row in zip(names, rows, strict=True):
+            if row.shape != (12,):
+                raise CommandError(f"command.{name} must have shape (12,), got {row.shape}")
+        numbers = np.array(rows, dtype=float)
+        if not math.isfinite(np.vdot(numbers, numbers)):  # cheap, but huge numbers overflow
+            for name, row in zip(names, rows, strict=True):
+                if not np.isfinite(row).all():
+                    raise CommandError(f"command.{name} is not finite: {row}")
+        return numbers
+
     @staticmethod
     def torque(tau: Array12) -> JointCommand:
         """Pure torque: no stiffness, no damping."""

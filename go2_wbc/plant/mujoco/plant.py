@@ -21,7 +21,7 @@ from go2_wbc.plant.mujoco.forces import Contacts, FootContacts, Pushes, foot_con
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN, bin_forces, read_joints
 from go2_wbc.plant.mujoco.lidar import DepthConfig, LidarConfig, RangeSensor, chosen
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
-from go2_wbc.plant.mujoco.setup import PlantSetup, SavedPhysics, command_numbers, prepare, settle
+from go2_wbc.plant.mujoco.setup import PlantSetup, SavedPhysics, prepare, settle
 from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors, SensorNoise
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.records import packed
@@ -246,13 +246,15 @@ class MujocoPlant(Plant):
             ClosedError: after ``close()``.
         """
         self._check_open()
-        self._waiting.append(command_numbers(command))
+        self._waiting.append(command.numbers())
         if len(self._waiting) > self._late:
             self._acting = self._waiting.popleft()
         model, data = self._model, self._data
-        total, shares = np.zeros(12), self._faults.torque_shares(self.time)
-        for hold in self._faults.begun_holds(self.time, self._period):
-            self._pushes.hold(hold.part, hold.value, HELD_TIME)
+        total, shares = np.zeros(12), None
+        if self._faults.known:
+            shares = self._faults.torque_shares(self.time)
+            for hold in self._faults.begun_holds(self.time, self._period):
+                self._pushes.hold(hold.part, hold.value, HELD_TIME)
         for remaining in range(self._substeps, 0, -1):
             drive(self._acting, *self._motors, total)
             if shares is not None:
@@ -449,16 +451,13 @@ class MujocoPlant(Plant):
 
     def _sense(self) -> None:
         """Lets the robot's own sensors read, if it lives on them."""
-        last = self._state, self._imu
+        last, faults = (self._state, self._imu), self._faults
         self._truth, self._state, self._imu = None, None, None
-        if last[0] is not None and self._faults.loses(self.time, self._rng):
+        if faults.known and last[0] is not None and faults.loses(self.time, self._rng):
             self._state, self._imu = last
         elif self._senses is not None:
-            sample = self.truth(), self._true_imu()
-            if self._faults.known:
-                self._state, self._imu = self._senses.sense(*sample, self._faults.broken)
-            else:
-                self._state, self._imu = self._senses.sense(*sample)
+            given = [faults.broken] if faults.known else []
+            self._state, self._imu = self._senses.sense(self.truth(), self._true_imu(), *given)
 
     def _true_imu(self) -> ImuSample:
         sensor = self._data.sensor

@@ -21,7 +21,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.arguments import typed
-from go2_wbc.errors import CommandError, ConfigError, DescriptionError, ModelMismatch, unknown_name
+from go2_wbc.errors import ConfigError, DescriptionError, ModelMismatch, unknown_name
 from go2_wbc.files import write_atomically
 from go2_wbc.legs import LEGS
 from go2_wbc.machine_code import kernel_folder
@@ -156,27 +156,6 @@ def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout, MotorModel
     layout = find_layout(spec, model, description.efforts)
     motor = MotorModel.named(setup.motor, description).with_peak(layout.torque_limits)
     return model, layout, motor, description
-
-
-def command_numbers(command: JointCommand) -> Float[np.ndarray, "5 12"]:
-    """The numbers of a command, in the order that the motors read.
-
-    Raises:
-        CommandError: if it has a value that is not finite, or an array of the wrong shape.
-    """
-    rows = [getattr(command, name) for name in _COMMANDED]
-    for name, row in zip(_COMMANDED, rows, strict=True):
-        if row.shape != (12,):
-            raise CommandError(f"command.{name} must have shape (12,), got {row.shape}")
-    numbers = np.array(rows, dtype=float)
-    if not math.isfinite(np.vdot(numbers, numbers)):  # cheap, but huge numbers overflow
-        for name, row in zip(_COMMANDED, rows, strict=True):
-            if not np.isfinite(row).all():
-                raise CommandError(f"command.{name} is not finite: {row}")
-    return numbers
-
-
-_COMMANDED = ("tau", "q_des", "v_des", "kp", "kd")
 
 
 # Joint angles [rad] of the Go2 lying limp, belly down: where this model comes to rest within 1e-3
