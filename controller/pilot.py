@@ -8,6 +8,7 @@ procedures into calls.
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from functools import partial
 
 from controller import modes
