@@ -40,29 +40,21 @@ Reply = Callable[[Outcome], None]
 
 @dataclass(slots=True, eq=False)
 class Job:
-    """Something to do.
+    """Something to do."""
 
-    Attributes:
-        name: what the user calls it.
-        act: does it and returns what was measured; raises ``Aborted`` or a ``Go2WbcError`` if it
-            was not done.
-        reply: is told what came of it, once.
-        prepare: slow work, done in a thread of its own before ``act``.
-        begin: called just before ``act``; returns why the job cannot begin, or nothing. A ``damp``
-            from now on must end ``act``.
-        phase: "preparing", "playing" or "returning".
-        is_cancelled: whether it has been called off.
-        start: robot time [s] at which its turn came.
-    """
-
-    name: str
+    name: str  #: what the user calls it
     act: Callable[[Job], Measurements]
-    reply: Reply
+    """Does it and returns what was measured; raises ``Aborted`` or a ``Go2WbcError`` if it was not
+    done."""
+    reply: Reply  #: is told what came of it, once
     prepare: Callable[[], None] | None = None
+    """Slow work, done in a thread of its own before ``act``."""
     begin: Callable[[], str] = lambda: ""
-    phase: str = "preparing"
-    is_cancelled: bool = False
-    start: float = 0.0
+    """Called just before ``act``; returns why the job cannot begin, or nothing. A ``damp`` from now
+    on must end ``act``."""
+    phase: str = "preparing"  #: "preparing", "playing" or "returning"
+    is_cancelled: bool = False  #: whether it has been called off
+    start: float = 0.0  #: robot time [s] at which its turn came
     _due: float = math.inf
     _is_prepared: bool = True
     _is_answered: bool = False

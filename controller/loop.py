@@ -44,17 +44,12 @@ OLDEST_SCAN = 64  #: Ticks by which a scan may be late
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Why the loop took the robot out of its behaviour.
+    """Why the loop took the robot out of its behaviour."""
 
-    Attributes:
-        reason: in plain words.
-        is_fall: whether the robot has fallen.
-        may_fall: whether it went limp in the middle of balancing, so that it may yet fall.
-    """
-
-    reason: str
-    is_fall: bool = False
+    reason: str  #: in plain words
+    is_fall: bool = False  #: whether the robot has fallen
     may_fall: bool = False
+    """Whether it went limp in the middle of balancing, so that it may yet fall."""
 
 
 class ControlLoop:

@@ -164,17 +164,12 @@ class Telemetry:
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Copied ticks whose support margins are still to be computed, away from the control loop.
+    """Copied ticks whose support margins are still to be computed, away from the control loop."""
 
-    Attributes:
-        unfinished: the recording, its support margins nan.
-        p_world_feet: (n, 4, 3) foot centres [m].
-        grounds: cells of ground that were seen, the newest map first.
-    """
-
-    unfinished: Recording
-    p_world_feet: Float[np.ndarray, "n 4 3"]
+    unfinished: Recording  #: the recording, its support margins nan
+    p_world_feet: Float[np.ndarray, "n 4 3"]  #: (n, 4, 3) foot centres [m]
     grounds: tuple[Float[np.ndarray, "_ 3"], ...]
+    """Cells of ground that were seen, the newest map first."""
 
     def recording(self) -> Recording:
         """The finished recording."""

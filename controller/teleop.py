@@ -34,15 +34,10 @@ LEGEND = (
 
 @dataclass(frozen=True, slots=True)
 class PadReading:
-    """What a gamepad says.
+    """What a gamepad says."""
 
-    Attributes:
-        axes: of its sticks, -1 to 1.
-        pressed: buttons that have been pressed since the last reading.
-    """
-
-    axes: tuple[float, ...]
-    pressed: tuple[int, ...] = ()
+    axes: tuple[float, ...]  #: of its sticks, -1 to 1
+    pressed: tuple[int, ...] = ()  #: buttons that have been pressed since the last reading
 
     @property
     def keys(self) -> str:

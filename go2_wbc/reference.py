@@ -44,21 +44,17 @@ STANCE, SWING, JOINTS = (int(task) for task in LegTask)
 class Target(Record):
     """The numbers of a ``Reference``, one after the other, as kernels read and fill them.
 
-    Attributes:
-        is_com: whether position means the CoM, else the origin of the base.
-        legs: ``LegTask`` of each leg.
-
     All others as in ``Reference`` and its ``BodyTarget``.
     """
 
-    is_com: bool
+    is_com: bool  #: whether position means the CoM, else the origin of the base
     p_world: Float[np.ndarray, "3"]
     v_world: Float[np.ndarray, "3"]
     a_world: Float[np.ndarray, "3"]
     R_world_base: Float[np.ndarray, "3 3"]
     w_world: Float[np.ndarray, "3"]
     dw_world: Float[np.ndarray, "3"]
-    legs: Float[np.ndarray, "4"]
+    legs: Float[np.ndarray, "4"]  #: ``LegTask`` of each leg
     normal_force_min: Float[np.ndarray, "4"]
     normal_force_max: Float[np.ndarray, "4"]
     p_world_feet: Float[np.ndarray, "4 3"]

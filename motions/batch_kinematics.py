@@ -49,19 +49,13 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """What comes of it.
+    """What comes of it."""
 
-    Attributes:
-        p_base: (n, 3) origin of the base [m].
-        q_joints: (n, 12) joint angles [rad].
-        p_com: (n, 3) CoM [m].
-        miss: (n, 4) distance [m] by which such a foot is out of its leg's reach.
-    """
-
-    p_base: Float[np.ndarray, "n 3"]
-    q_joints: Float[np.ndarray, "n 12"]
-    p_com: Float[np.ndarray, "n 3"]
+    p_base: Float[np.ndarray, "n 3"]  #: (n, 3) origin of the base [m]
+    q_joints: Float[np.ndarray, "n 12"]  #: (n, 12) joint angles [rad]
+    p_com: Float[np.ndarray, "n 3"]  #: (n, 3) CoM [m]
     miss: Float[np.ndarray, "n 4"]
+    """(n, 4) distance [m] by which such a foot is out of its leg's reach."""
 
 
 def place(wanted: Wanted, steps: int, model: RobotModel) -> Placed:

@@ -81,19 +81,12 @@ class Annotation:
 
 @dataclass(frozen=True, slots=True)
 class CertifiedRun:
-    """One randomised run.
+    """One randomised run."""
 
-    Attributes:
-        seed: that it can be repeated with.
-        conditions: what the seed has drawn, in words.
-        is_done: whether the movement was done.
-        text: what went wrong, or came nearest to it.
-    """
-
-    seed: int
-    conditions: str
-    is_done: bool
-    text: str
+    seed: int  #: that it can be repeated with
+    conditions: str  #: what the seed has drawn, in words
+    is_done: bool  #: whether the movement was done
+    text: str  #: what went wrong, or came nearest to it
 
 
 @dataclass(frozen=True, slots=True)

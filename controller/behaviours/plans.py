@@ -81,17 +81,12 @@ class SafeReturn:
 
 @dataclass(frozen=True, slots=True)
 class WayOut:
-    """How a plan is left.
+    """How a plan is left."""
 
-    Attributes:
-        target: instant [s] on four feet at which the clock shall stand.
-        keeps_tempo_until: instant [s] before which it keeps its tempo; -inf if it need not.
-        is_left_in_motion: whether the plan is left at the target as it goes, and not slowed down.
-    """
-
-    target: float
-    keeps_tempo_until: float
+    target: float  #: instant [s] on four feet at which the clock shall stand
+    keeps_tempo_until: float  #: instant [s] before which it keeps its tempo; -inf if it need not
     is_left_in_motion: bool = False
+    """Whether the plan is left at the target as it goes, and not slowed down."""
 
 
 def way_out(plan: MotionPlan, t: float) -> WayOut:
@@ -288,12 +283,10 @@ class Approach:
     """The way from where the robot stands to a dynamic plan, by minimum jerk.
 
     Feedback alone comes near in half a second; a plan that flies or balances before is met so.
-
-    Attributes:
-        p_start: (3,) place [m] of the tracked point from its planned one, in the motion's frame.
     """
 
     p_start: Float[np.ndarray, "3"]
+    """(3,) place [m] of the tracked point from its planned one, in the motion's frame."""
 
     @staticmethod
     def of(plan: MotionPlan, anchor: Anchor, snapshot: Snapshot) -> Approach:

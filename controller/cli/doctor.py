@@ -94,17 +94,11 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class ImportProbe:
-    """How the import of a module went.
+    """How the import of a module went."""
 
-    Attributes:
-        error: why it failed, in one line; empty if it worked.
-        file: the file that was imported.
-        solvers: the QP solvers that the module offers, if it is ``qpsolvers``.
-    """
-
-    error: str = ""
-    file: str = ""
-    solvers: tuple[str, ...] = ()
+    error: str = ""  #: why it failed, in one line; empty if it worked
+    file: str = ""  #: the file that was imported
+    solvers: tuple[str, ...] = ()  #: the QP solvers that the module offers, if it is ``qpsolvers``
 
 
 def run(*, json: Annotated[bool, "print JSON for a program to read"] = False) -> int:

@@ -33,17 +33,11 @@ from go2_wbc import errors
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A subcommand.
+    """A subcommand."""
 
-    Attributes:
-        name: what is typed.
-        place: ``MODULE:FUNCTION`` of what it runs; the function is ``run`` if none is named.
-        summary: its line in the list.
-    """
-
-    name: str
-    place: str
-    summary: str
+    name: str  #: what is typed
+    place: str  #: ``MODULE:FUNCTION`` of what it runs; the function is ``run`` if none is named
+    summary: str  #: its line in the list
 
     def add_to(self, subparsers: Subparsers) -> None:
         """Import it, and add its parser."""

@@ -64,17 +64,11 @@ class Failure:
 
 @dataclass(frozen=True, slots=True)
 class Ended(Generic[Item]):
-    """What came of one item: a value, or a failure.
+    """What came of one item: a value, or a failure."""
 
-    Attributes:
-        item: which.
-        value: what the function returned; None for a failure.
-        failure: why there is none.
-    """
-
-    item: Item
-    value: Any = None
-    failure: Failure | None = None
+    item: Item  #: which
+    value: Any = None  #: what the function returned; None for a failure
+    failure: Failure | None = None  #: why there is none
 
 
 Ends = Generator[Ended[Item], None, None]

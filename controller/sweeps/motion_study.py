@@ -40,15 +40,10 @@ def plan_of(archive: bytes) -> CompiledPlan:
 
 @dataclass(frozen=True, slots=True)
 class MotionStudy:
-    """Plays a motion, unchecked, on a robot that has got up.
+    """Plays a motion, unchecked, on a robot that has got up."""
 
-    Attributes:
-        archive: its compiled plan, as ``archive_of`` gives it.
-        world: each seed plays in a sample of it.
-    """
-
-    archive: bytes
-    world: World
+    archive: bytes  #: its compiled plan, as ``archive_of`` gives it
+    world: World  #: each seed plays in a sample of it
 
     def __call__(self, seed: int) -> Row:
         """Whether it was done, what went wrong, and what was measured.

@@ -102,17 +102,11 @@ class PayloadConfig:
 
 @dataclass(frozen=True, slots=True)
 class PayloadNumbers:
-    """What the wrench of a payload is computed with, besides the snapshot.
+    """What the wrench of a payload is computed with, besides the snapshot."""
 
-    Attributes:
-        config: when anything is felt.
-        gravity: [m/s^2].
-        friction: what the joints take of the torques.
-    """
-
-    config: PayloadConfig
-    gravity: float
-    friction: JointFriction
+    config: PayloadConfig  #: when anything is felt
+    gravity: float  #: [m/s^2]
+    friction: JointFriction  #: what the joints take of the torques
 
 
 class PayloadWrench(Record):

@@ -64,19 +64,13 @@ that are not finite."""
 
 
 class Reduction(Record):
-    """What follows from the unknowns u.
+    """What follows from the unknowns u."""
 
-    Attributes:
-        legs: (3): the joints' accelerations of the stance legs, legs (a_b, 1).
-        dynamics: (1): the base's rows.
-        base: (4): that of the base, a_b = base (u, 1).
-        affine: the decision, z = affine (u, 1).
-    """
-
-    dynamics: BaseRows
+    dynamics: BaseRows  #: (1): the base's rows
     legs: Float[np.ndarray, "12 7"]
-    base: Float[np.ndarray, "6 13"]
-    affine: Float[np.ndarray, "30 13"]
+    """(3): the joints' accelerations of the stance legs, legs (a_b, 1)."""
+    base: Float[np.ndarray, "6 13"]  #: (4): that of the base, a_b = base (u, 1)
+    affine: Float[np.ndarray, "30 13"]  #: the decision, z = affine (u, 1)
 
 
 @subroutine

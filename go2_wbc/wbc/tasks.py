@@ -77,15 +77,10 @@ class TaskRows(Record):
 
 
 class BuiltIn(Task):
-    """A task of ours, whose rows one compiled function fills.
+    """A task of ours, whose rows one compiled function fills."""
 
-    Attributes:
-        fill: that function, of snapshot, target, task and rows.
-        part: which rows it fills, or those of the legs that do this.
-    """
-
-    fill: Callable[..., None]
-    part: range | int
+    fill: Callable[..., None]  #: that function, of snapshot, target, task and rows
+    part: range | int  #: which rows it fills, or those of the legs that do this
 
     def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
         """Rows A z = b of this task now; ``fill`` says which."""

@@ -34,23 +34,15 @@ STANDING_TURN = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """What is asked at one knot.
+    """What is asked at one knot."""
 
-    Attributes:
-        knot: which.
-        label: of the phase that ends there.
-        pose: (6,) trunk: place [m] and roll, pitch, yaw [rad]; or ``None``.
-        p_feet: (4, 3) places [m].
-        asked: (4,) feet whose places are asked.
-        lands: (4,) feet that touch down there.
-    """
-
-    knot: int
-    label: str
+    knot: int  #: which
+    label: str  #: of the phase that ends there
     pose: Float[np.ndarray, "6"] | None
-    p_feet: Float[np.ndarray, "4 3"]
-    asked: Bool[np.ndarray, "4"]
-    lands: Bool[np.ndarray, "4"]
+    """(6,) trunk: place [m] and roll, pitch, yaw [rad]; or ``None``."""
+    p_feet: Float[np.ndarray, "4 3"]  #: (4, 3) places [m]
+    asked: Bool[np.ndarray, "4"]  #: (4,) feet whose places are asked
+    lands: Bool[np.ndarray, "4"]  #: (4,) feet that touch down there
 
 
 @dataclass(frozen=True, slots=True)

@@ -282,18 +282,14 @@ LAG_STEP = 0.005  #: Between two lags [s] that are compared
 class PlanTarget:
     """A motion as it was written, from rest to rest, in its own frame (see ``FullState``).
 
-    Attributes:
-        times: (n,) increasing instants [s], from 0.
-        q: (n, 19) configurations, whether or not physics allows them.
-        stance: (n, 4) feet that stand from each instant to the next; all of them at both ends.
-
     Raises:
         TimelineError: if these are no motion that can be solved.
     """
 
-    times: Float[np.ndarray, " n"]
-    q: Float[np.ndarray, "n 19"]
+    times: Float[np.ndarray, " n"]  #: (n,) increasing instants [s], from 0
+    q: Float[np.ndarray, "n 19"]  #: (n, 19) configurations, whether or not physics allows them
     stance: Bool[np.ndarray, "n 4"]
+    """(n, 4) feet that stand from each instant to the next; all of them at both ends."""
 
     def __post_init__(self) -> None:
         """Check that it can be solved."""

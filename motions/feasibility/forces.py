@@ -72,24 +72,18 @@ FEET = tuple(leg.name for leg in LEGS)
 
 @dataclass(frozen=True, slots=True)
 class Forces:
-    """What the ground and the motors must give.
-
-    Attributes:
-        contact: (n, 4, 3) forces on the feet in the frame of the motion [N].
-        tau: (n, 12) joint torques [N m].
-        missing: (n, 2) part of the force [N] and of the moment [N m] that the feet cannot give.
-        zmp: (n, 2) zero-moment point on the ground [m].
-        wrench: (n, 6) what the trunk needs, in its frame [N, N m].
-        v_motors: (n, 12) joint speeds [rad/s] at which the torques are given; those of the path
-            unless said.
-    """
+    """What the ground and the motors must give."""
 
     contact: Float[np.ndarray, "n 4 3"]
-    tau: Float[np.ndarray, "n 12"]
+    """(n, 4, 3) forces on the feet in the frame of the motion [N]."""
+    tau: Float[np.ndarray, "n 12"]  #: (n, 12) joint torques [N m]
     missing: Float[np.ndarray, "n 2"]
-    zmp: Float[np.ndarray, "n 2"]
-    wrench: Float[np.ndarray, "n 6"]
+    """(n, 2) part of the force [N] and of the moment [N m] that the feet cannot give."""
+    zmp: Float[np.ndarray, "n 2"]  #: (n, 2) zero-moment point on the ground [m]
+    wrench: Float[np.ndarray, "n 6"]  #: (n, 6) what the trunk needs, in its frame [N, N m]
     v_motors: Float[np.ndarray, "n 12"] | None = None
+    """(n, 12) joint speeds [rad/s] at which the torques are given; those of the path unless
+    said."""
 
     __repr__ = brief
 

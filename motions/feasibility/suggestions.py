@@ -65,23 +65,15 @@ class Suggestion:
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
-    """One kind of change.
+    """One kind of change."""
 
-    Attributes:
-        name: see ``Suggestion.kind``.
-        ladder: numbers of steps that are tried, increasing.
-        calls: calls of one number each, in their order, by what that is for a number of steps.
-        meaning: in words, of ``steps`` and of how long it ``lasts`` [s] after them.
-        digits: to which the numbers are rounded.
-        finest: difference of two numbers of steps that is looked for.
-    """
-
-    name: str
-    ladder: Sequence[int]
+    name: str  #: see ``Suggestion.kind``
+    ladder: Sequence[int]  #: numbers of steps that are tried, increasing
     calls: Mapping[str, Callable[[int], float]]
-    meaning: str
-    digits: int = 2
-    finest: int = 1
+    """Calls of one number each, in their order, by what that is for a number of steps."""
+    meaning: str  #: in words, of ``steps`` and of how long it ``lasts`` [s] after them
+    digits: int = 2  #: to which the numbers are rounded
+    finest: int = 1  #: difference of two numbers of steps that is looked for
 
     def numbers(self, steps: int) -> dict[str, float]:
         """The calls' numbers, by their names."""

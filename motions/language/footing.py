@@ -23,17 +23,11 @@ _ROUND = 64.0  #: 1 / (u^3 (1 - u)^3) at u = 1/2: makes the height of a swing 1 
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """Where the feet stand, or are on their way, at n instants.
+    """Where the feet stand, or are on their way, at n instants."""
 
-    Attributes:
-        p_feet: (n, 4, 3) their centres [m].
-        frames: (n, 3) x, y [m] and yaw [rad] of the frame of the four feet.
-        headings: (n, 3, 3) its attitude.
-    """
-
-    p_feet: Float[np.ndarray, "n 4 3"]
-    frames: Float[np.ndarray, "n 3"]
-    headings: Float[np.ndarray, "n 3 3"]
+    p_feet: Float[np.ndarray, "n 4 3"]  #: (n, 4, 3) their centres [m]
+    frames: Float[np.ndarray, "n 3"]  #: (n, 3) x, y [m] and yaw [rad] of the frame of the four feet
+    headings: Float[np.ndarray, "n 3 3"]  #: (n, 3, 3) its attitude
 
     def part(self, rows: slice) -> Ground:
         """Some of its instants."""

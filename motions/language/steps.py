@@ -97,13 +97,10 @@ across, with 40 ms on four feet between them."""
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """Where the frame of the feet goes, seen from where it starts.
-
-    Attributes:
-        poses: (k, 3) x, y [m] and yaw [rad] along the way, close to each other.
-    """
+    """Where the frame of the feet goes, seen from where it starts."""
 
     poses: Float[np.ndarray, "k 3"]
+    """(k, 3) x, y [m] and yaw [rad] along the way, close to each other."""
 
     def efforts(self, gait: StepGait) -> Float[np.ndarray, " k"]:
         """Rounds of ``gait`` that it takes to get to each pose."""

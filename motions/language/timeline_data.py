@@ -28,13 +28,10 @@ MOST_BEATS = 10_000  #: Nor are more than so many: own choice, an hour at 160 a 
 
 @dataclass(frozen=True, slots=True)
 class BeatClock:
-    """Counts in beats: straight between the instants of two, and on as the last two are apart.
-
-    Attributes:
-        instants: when [s] after the start of the motion beats 0, 1, 2 ... are; two or more.
-    """
+    """Counts in beats: straight between the instants of two, and on as the last two are apart."""
 
     instants: tuple[float, ...] = (0.0, 1.0)
+    """When [s] after the start of the motion beats 0, 1, 2 ... are; two or more."""
 
     @staticmethod
     def steady(interval: float) -> BeatClock:

@@ -80,17 +80,11 @@ class Dance:
 
 @dataclass(frozen=True, slots=True)
 class Pulses:
-    """The instants of a song on which a dance has its accents.
+    """The instants of a song on which a dance has its accents."""
 
-    Attributes:
-        times: instants [s].
-        bar: pulses of a bar.
-        downbeat: number of the first pulse that begins one.
-    """
-
-    times: Float[np.ndarray, " n"]
-    bar: int
-    downbeat: int
+    times: Float[np.ndarray, " n"]  #: instants [s]
+    bar: int  #: pulses of a bar
+    downbeat: int  #: number of the first pulse that begins one
 
     @property
     def usual(self) -> float:

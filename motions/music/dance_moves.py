@@ -63,15 +63,11 @@ class Move(ABC):
 
 @dataclass(frozen=True, slots=True)
 class Strokes(Move):
-    """The trunk moves out, perhaps from one side to the other, and back.
-
-    Attributes:
-        goals: offsets [m, rad] of the trunk on each pulse; the first one that is named is the
-            accent.
-    """
+    """The trunk moves out, perhaps from one side to the other, and back."""
 
     name: str
     goals: tuple[Mapping[str, float], ...]
+    """Offsets [m, rad] of the trunk on each pulse; the first one that is named is the accent."""
 
     def pulses(self, pulse: float) -> int:
         """One for each goal."""

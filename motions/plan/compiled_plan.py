@@ -33,21 +33,15 @@ from motions.postures import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN
 
 @dataclass(frozen=True, slots=True)
 class DynamicSpan:
-    """Part of a plan that obeys the whole robot's dynamics.
+    """Part of a plan that obeys the whole robot's dynamics."""
 
-    Attributes:
-        start: when [s] it starts in the plan.
-        frame: where: the frame of its problem in that of the plan.
-        asked: phases, or a motion that physics does not allow as it was written, in ``frame``.
-        trajectory: states, torques, forces, gains and deviation; in the plan's frame.
-        tolerance: how far it may be from what was asked.
-    """
-
-    start: float
-    frame: Anchor
+    start: float  #: when [s] it starts in the plan
+    frame: Anchor  #: where: the frame of its problem in that of the plan
     asked: PhaseProblem | PlanTarget
+    """Phases, or a motion that physics does not allow as it was written, in ``frame``."""
     trajectory: DynamicTrajectory
-    tolerance: Tolerance = Tolerance()
+    """States, torques, forces, gains and deviation; in the plan's frame."""
+    tolerance: Tolerance = Tolerance()  #: how far it may be from what was asked
 
     @property
     def end(self) -> float:
@@ -205,21 +199,14 @@ LEAST_FEET = 3
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """What cannot be done as it is written.
+    """What cannot be done as it is written."""
 
-    Attributes:
-        check: what the feasibility check calls it.
-        subject: the leg, or the trunk.
-        time: when [s] it is worst.
-        miss: distance [m] by which the leg is too short; nan if that is not what is wrong.
-        reason: why no pose is balanced.
-    """
-
-    check: str
-    subject: str
-    time: float
+    check: str  #: what the feasibility check calls it
+    subject: str  #: the leg, or the trunk
+    time: float  #: when [s] it is worst
     miss: float = np.nan
-    reason: str = ""
+    """Distance [m] by which the leg is too short; nan if that is not what is wrong."""
+    reason: str = ""  #: why no pose is balanced
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

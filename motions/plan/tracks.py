@@ -116,15 +116,11 @@ def eased(key: Key, times: Times) -> Float[np.ndarray, " n"]:
 
 @dataclass(frozen=True, slots=True)
 class JointPaths:
-    """What all legs do at n instants.
+    """What all legs do at n instants."""
 
-    Attributes:
-        q: (n, 12) joint angles [rad].
-        miss: (n, 4) distance [m] by which each foot is asked for more than its leg reaches.
-    """
-
-    q: Joints
+    q: Joints  #: (n, 12) joint angles [rad]
     miss: Float[np.ndarray, "n 4"]
+    """(n, 4) distance [m] by which each foot is asked for more than its leg reaches."""
 
 
 @dataclass(frozen=True, slots=True)

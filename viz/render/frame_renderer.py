@@ -146,29 +146,20 @@ _SUPERSAMPLING = 3  # Pillow draws shapes without antialiasing: draw larger, the
 
 @dataclass(frozen=True, slots=True)
 class ShotStyle:
-    """How pictures of a recording are taken.
+    """How pictures of a recording are taken."""
 
-    Attributes:
-        size: width and height [px].
-        azimuth: mean direction of the camera seen from the robot, 0 is ahead of it [rad].
-        sway: the azimuth swings by this much [rad] around its mean; a still camera looks dead.
-        elevation: camera angle above the floor [rad].
-        distance: from the camera to the robot [m].
-        smoothing: standard deviation [s] of the low-pass filter on where the camera looks.
-        turn_smoothing: the same for its turning with the robot.
-        detail: size of the smallest feature kept of the meshes [m].
-        samples: edge of the sample grid in each pixel.
-    """
-
-    size: tuple[int, int] = (640, 400)
+    size: tuple[int, int] = (640, 400)  #: width and height [px]
     azimuth: float = np.deg2rad(-52.0)
+    """Mean direction of the camera seen from the robot, 0 is ahead of it [rad]."""
     sway: float = np.deg2rad(14.0)
-    elevation: float = np.deg2rad(17.0)
-    distance: float = 1.62
+    """The azimuth swings by this much [rad] around its mean; a still camera looks dead."""
+    elevation: float = np.deg2rad(17.0)  #: camera angle above the floor [rad]
+    distance: float = 1.62  #: from the camera to the robot [m]
     smoothing: float = 0.6
-    turn_smoothing: float = 1.5
-    detail: float = 0.006
-    samples: int = 2
+    """Standard deviation [s] of the low-pass filter on where the camera looks."""
+    turn_smoothing: float = 1.5  #: the same for its turning with the robot
+    detail: float = 0.006  #: size of the smallest feature kept of the meshes [m]
+    samples: int = 2  #: edge of the sample grid in each pixel
 
 
 @final

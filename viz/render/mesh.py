@@ -26,19 +26,13 @@ _QUADRIC_REGULARISATION = 0.02  # share of the mean point in a cluster's positio
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """Coloured triangles.
+    """Coloured triangles."""
 
-    Attributes:
-        points: (n, 3) vertex positions [m].
-        normals: (n, 3) outward unit normals; a crease repeats the point with another normal.
-        triangles: (m, 3) vertex rows, counter-clockwise seen from outside.
-        colors: (m, 3) red, green, blue of each triangle in 0..1.
-    """
-
-    points: Float[np.ndarray, "n 3"]
+    points: Float[np.ndarray, "n 3"]  #: (n, 3) vertex positions [m]
     normals: Float[np.ndarray, "n 3"]
-    triangles: Int[np.ndarray, "m 3"]
-    colors: Float[np.ndarray, "m 3"]
+    """(n, 3) outward unit normals; a crease repeats the point with another normal."""
+    triangles: Int[np.ndarray, "m 3"]  #: (m, 3) vertex rows, counter-clockwise seen from outside
+    colors: Float[np.ndarray, "m 3"]  #: (m, 3) red, green, blue of each triangle in 0..1
 
     @staticmethod
     def joined(parts: Sequence[Surface]) -> Surface:

@@ -36,19 +36,13 @@ _BLACK_LIFT = 34 / 255  # least value of a colour: pure black would show no shap
 
 @dataclass(frozen=True, slots=True)
 class RobotVisuals:
-    """Everything that is drawn of the robot.
-
-    Attributes:
-        meshes: the surfaces of each mesh file in its own frame, one for each colour, by its path.
-        geometry: which mesh sits where, in the URDF's order.
-        model: Pinocchio's kinematic model (free flyer).
-        description: of the robot.
-    """
+    """Everything that is drawn of the robot."""
 
     meshes: dict[str, tuple[Surface, ...]]
-    geometry: pin.GeometryModel
-    model: pin.Model
-    description: RobotDescription
+    """The surfaces of each mesh file in its own frame, one for each colour, by its path."""
+    geometry: pin.GeometryModel  #: which mesh sits where, in the URDF's order
+    model: pin.Model  #: Pinocchio's kinematic model (free flyer)
+    description: RobotDescription  #: of the robot
 
     @property
     def foot_radius(self) -> float:

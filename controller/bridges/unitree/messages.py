@@ -159,21 +159,13 @@ def _byte_maps(layout: np.dtype[np.void]) -> tuple[Int[np.ndarray, " n"], Int[np
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A remote procedure call.
+    """A remote procedure call."""
 
-    Attributes:
-        id: chosen by the client, repeated in the response.
-        api_id: which procedure.
-        lease_id: of a client that asked for sole control, else 0.
-        is_one_way: whether the client waits for no response.
-        parameter: JSON, or empty.
-    """
-
-    id: int
-    api_id: int
-    lease_id: int = 0
-    is_one_way: bool = False
-    parameter: str = ""
+    id: int  #: chosen by the client, repeated in the response
+    api_id: int  #: which procedure
+    lease_id: int = 0  #: of a client that asked for sole control, else 0
+    is_one_way: bool = False  #: whether the client waits for no response
+    parameter: str = ""  #: JSON, or empty
 
 
 @dataclass(frozen=True, slots=True)

@@ -105,19 +105,12 @@ class SportMode(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class SportStatus:
-    """What the sport service says of itself in ``rt/sportmodestate``.
+    """What the sport service says of itself in ``rt/sportmodestate``."""
 
-    Attributes:
-        mode: see ``SportMode``.
-        is_acting: whether an action is running.
-        is_trotting: whether the robot is in walking mode.
-        error_code: of the last action that failed, 0 since one was done.
-    """
-
-    mode: SportMode = SportMode.DAMPING
-    is_acting: bool = False
-    is_trotting: bool = False
-    error_code: int = 0
+    mode: SportMode = SportMode.DAMPING  #: see ``SportMode``
+    is_acting: bool = False  #: whether an action is running
+    is_trotting: bool = False  #: whether the robot is in walking mode
+    error_code: int = 0  #: of the last action that failed, 0 since one was done
 
 
 MOVE_LEAST, MOVE_GREATEST = (-2.5, -1.0, -4.0), (3.8, 1.0, 4.0)

@@ -127,14 +127,12 @@ class FootContacts:
 
     The velocity is that of the point of the foot that is at the contact now, not of the foot's
     centre: a round foot that rolls has a moving centre and a resting contact point.
-
-    Attributes:
-        p_world_contact: the deepest contact point of each foot [m]; nan without contact.
-        v_world_contact: tangential velocity of the foot's material there [m/s]; 0 without contact.
     """
 
     p_world_contact: Float[np.ndarray, "4 3"]
+    """The deepest contact point of each foot [m]; nan without contact."""
     v_world_contact: Float[np.ndarray, "4 3"]
+    """Tangential velocity of the foot's material there [m/s]; 0 without contact."""
 
     __repr__ = brief
 
@@ -144,22 +142,16 @@ class Contacts:
     """All contacts of one instant as MuJoCo holds them, copied: quick to take, evaluated later.
 
     Taken after ``mj_step1``: places and velocities belong to that state.
-
-    Attributes:
-        codes: sum of both geoms' codes: ``FOREIGN`` plus a bin if exactly one is the robot's.
-        distances: of the surfaces [m]; they touch from 0 on.
-        points: of contact in the world [m].
-        normals: of each contact.
-        p_world_com: the robot's centre of mass [m].
-        twists: velocities of the feet's bodies about it, angular first, along world axes.
     """
 
     codes: Int[np.ndarray, " n"]
-    distances: Float[np.ndarray, " n"]
-    points: Float[np.ndarray, "n 3"]
-    normals: Float[np.ndarray, "n 3"]
-    p_world_com: Float[np.ndarray, "3"]
+    """Sum of both geoms' codes: ``FOREIGN`` plus a bin if exactly one is the robot's."""
+    distances: Float[np.ndarray, " n"]  #: of the surfaces [m]; they touch from 0 on
+    points: Float[np.ndarray, "n 3"]  #: of contact in the world [m]
+    normals: Float[np.ndarray, "n 3"]  #: of each contact
+    p_world_com: Float[np.ndarray, "3"]  #: the robot's centre of mass [m]
     twists: Float[np.ndarray, "4 6"]
+    """Velocities of the feet's bodies about it, angular first, along world axes."""
 
     __repr__ = brief
 
