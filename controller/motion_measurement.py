@@ -154,44 +154,29 @@ OF_FEET = ("feet_off", "paw_off", "landed_off")
 class MotionMeasurement:
     """What was measured while a motion was played.
 
-    Attributes:
-        fall: why the robot fell, or went limp because it fell, or None.
-        said, reason: what ``play`` said, in its words.
-        slip: largest distance [m] that the material of a standing foot slid at its contact point.
-        torque, speed: largest share of a joint's torque and speed limit.
-        saturated: time [s] in which some motor gave all it has.
-        tracking: largest distance [m] of the CoM from its plan.
-        ends_off: largest distance [m] of the trunk's ends from their plan, seen from its middle.
-        feet_off: largest distance [m] of a raised foot from its plan, seen from the trunk.
-        joint_distance: least distance [rad] of a joint to its limit.
-        stopped: time [s] in which a joint pressed against the stop at its limit.
-        touched: time [s] in which a knee or the trunk touched the ground, or a link another.
-        trunk_off: largest distance [m] of the trunk from what was written.
-        turned_off: largest angle [rad] of the trunk from what was written.
-        paw_off: largest distance [m] of a foot in the air from its place in the world.
-        landed_off: largest distance [m] of a foot that came down from its place.
-
     The last four count from where the robot stood at first, and where a part is solved, from where
     it stood then: at the ends of its phases, what was asked there.
     """
 
-    fall: str | None
-    said: bool
-    reason: str
+    fall: str | None  #: why the robot fell, or went limp because it fell, or None
+    said: bool  #: what ``play`` said
+    reason: str  #: in its words
     slip: float
-    torque: float
-    speed: float
-    saturated: float
-    tracking: float
+    """Largest distance [m] that the material of a standing foot slid at its contact point."""
+    torque: float  #: largest share of a joint's torque limit
+    speed: float  #: largest share of a joint's speed limit
+    saturated: float  #: time [s] in which some motor gave all it has
+    tracking: float  #: largest distance [m] of the CoM from its plan
     ends_off: float
-    feet_off: float
-    joint_distance: float
-    stopped: float
-    touched: float
-    trunk_off: float
-    turned_off: float
-    paw_off: float
-    landed_off: float
+    """Largest distance [m] of the trunk's ends from their plan, seen from its middle."""
+    feet_off: float  #: largest distance [m] of a raised foot from its plan, seen from the trunk
+    joint_distance: float  #: least distance [rad] of a joint to its limit
+    stopped: float  #: time [s] in which a joint pressed against the stop at its limit
+    touched: float  #: time [s] in which a knee or the trunk touched the ground, or a link another
+    trunk_off: float  #: largest distance [m] of the trunk from what was written
+    turned_off: float  #: largest angle [rad] of the trunk from what was written
+    paw_off: float  #: largest distance [m] of a foot in the air from its place in the world
+    landed_off: float  #: largest distance [m] of a foot that came down from its place
 
     @property
     def ok(self) -> bool:

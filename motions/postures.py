@@ -86,19 +86,13 @@ _HOMES: WeakKeyDictionary[RobotModel, Mapping[Posture, np.ndarray]] = WeakKeyDic
 
 @dataclass(frozen=True, slots=True)
 class PosturePlan(MotionPlan):
-    """The trunk goes from one pose to another by minimum jerk.
+    """The trunk goes from one pose to another by minimum jerk."""
 
-    Attributes:
-        name, entry, exit: see ``MotionPlan``.
-        point: which point the first three components of ``body`` move.
-        body: from x, y, z [m] and roll, pitch, yaw [rad] (6,) to others.
-    """
-
-    name: str
+    name: str  #: see ``MotionPlan``, as for the next two
     entry: Posture
     exit: Posture
-    point: TrackedPoint
-    body: Curve
+    point: TrackedPoint  #: which point the first three components of ``body`` move
+    body: Curve  #: from x, y, z [m] and roll, pitch, yaw [rad] (6,) to others
 
     @property
     def duration(self) -> float:  # type: ignore[override]

@@ -91,25 +91,16 @@ class CertifiedRun:
 
 @dataclass(frozen=True, slots=True)
 class CertifiedRate:
-    """How often a movement was done in randomised runs.
+    """How often a movement was done in randomised runs."""
 
-    Attributes:
-        n, done: runs, and those in which it was done.
-        interval, confidence: of the true rate, 0 to 1, and of the interval.
-        world: in which it holds, in words.
-        worst: the worst runs, the worst first.
-        versions: what else it holds for, by name.
-        outdated: why it does not hold for what is shown; empty if it does.
-    """
-
-    n: int
-    done: int
-    interval: tuple[float, float]
-    confidence: float
-    world: str
-    worst: tuple[CertifiedRun, ...]
-    versions: Mapping[str, str]
-    outdated: str = ""
+    n: int  #: runs
+    done: int  #: those in which it was done
+    interval: tuple[float, float]  #: of the true rate, 0 to 1
+    confidence: float  #: of the interval, 0 to 1
+    world: str  #: in which it holds, in words
+    worst: tuple[CertifiedRun, ...]  #: the worst runs, the worst first
+    versions: Mapping[str, str]  #: what else it holds for, by name
+    outdated: str = ""  #: why it does not hold for what is shown; empty if it does
 
 
 @typed()
@@ -145,24 +136,15 @@ class Verdict:
 @typed()
 @dataclass(frozen=True, slots=True)
 class Slider:
-    """A parameter that can be chosen on a live page.
+    """A parameter that can be chosen on a live page."""
 
-    Attributes:
-        name: of the parameter.
-        value: what is chosen now: a number, or one of ``words``.
-        low, high: what is valid.
-        is_whole: only whole numbers are.
-        unit: of the number.
-        words: what is valid instead of a number.
-    """
-
-    name: str
-    value: float | str
-    low: float = 0.0
-    high: float = 1.0
-    is_whole: bool = False
-    unit: str = ""
-    words: tuple[str, ...] = ()
+    name: str  #: of the parameter
+    value: float | str  #: what is chosen now: a number, or one of ``words``
+    low: float = 0.0  #: what is valid, at the least
+    high: float = 1.0  #: at the most
+    is_whole: bool = False  #: only whole numbers are
+    unit: str = ""  #: of the number
+    words: tuple[str, ...] = ()  #: what is valid instead of a number
 
 
 @typed()

@@ -157,14 +157,10 @@ HOLD_TIME = 2.0  #: Time [s] for which the paw is held up
 
 @dataclass(frozen=True, slots=True)
 class StepRun:
-    """One step that has just been run, ready to be measured.
+    """One step that has just been run, ready to be measured."""
 
-    Attributes:
-        outcome, recording: of its last blocking call, and what happened in it, at least one sample.
-    """
-
-    outcome: Outcome
-    recording: Recording
+    outcome: Outcome  #: of its last blocking call
+    recording: Recording  #: what happened in it, at least one sample
 
 
 @dataclass(frozen=True, slots=True)

@@ -50,16 +50,12 @@ order of a set of strings."""
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """Why an item has no value.
+    """Why an item has no value."""
 
-    Attributes:
-        text, details: in one line; the traceback, or empty.
-        has_died: whether its process ended, again and again, rather than the function raising.
-    """
-
-    text: str
-    details: str = ""
+    text: str  #: in one line
+    details: str = ""  #: the traceback, or empty
     has_died: bool = False
+    """Whether its process ended, again and again, rather than the function raising."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -107,19 +107,14 @@ def world_of(text: str) -> World:
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """A run of a motion with a seed.
+    """A run of a motion with a seed."""
 
-    Attributes:
-        title, row: what was run, and what was measured now.
-        differences: the values that are not those of the row that is kept; none, to the last bit,
-            under the same version, on the same kind of processor.
-        content: what ``viz`` shows of it.
-    """
-
-    title: str
-    row: Row
+    title: str  #: what was run
+    row: Row  #: what was measured now
     differences: tuple[str, ...]
-    content: ReplayContent
+    """The values that are not those of the row that is kept; none, to the last bit, under the same
+    version, on the same kind of processor."""
+    content: ReplayContent  #: what ``viz`` shows of it
 
 
 def replay(path: Path | str, seed: int) -> Replay:

@@ -152,14 +152,10 @@ _STREAM = 1  #: Keeps the numbers of a push apart from those of the robot and it
 
 @dataclass(frozen=True, slots=True)
 class GaitStudy:
-    """Walks with a velocity, on flat ground.
+    """Walks with a velocity, on flat ground."""
 
-    Attributes:
-        gait, command: its name; forward and left [m/s], turning left [rad/s].
-    """
-
-    gait: str
-    command: VelocityCommand
+    gait: str  #: its name
+    command: VelocityCommand  #: forward and left [m/s], turning left [rad/s]
 
     def __call__(self, seed: int) -> Row:
         """Velocity errors [m/s], [rad/s] over 5 s, loads as shares of the limits."""
@@ -185,14 +181,10 @@ class GaitStudy:
 
 @dataclass(frozen=True, slots=True)
 class PushStudy:
-    """Pushes the base of a trotting or standing robot, from any side, at any time of the stride.
+    """Pushes the base of a trotting or standing robot, from any side, at any time of the stride."""
 
-    Attributes:
-        impulse, speed: of the push [N s], over 0.1 s; at which the robot trots [m/s], 0 stands.
-    """
-
-    impulse: float
-    speed: float
+    impulse: float  #: of the push [N s], over 0.1 s
+    speed: float  #: at which the robot trots [m/s]; 0 stands
 
     def __call__(self, seed: int) -> Row:
         """Whether it stayed up, where the push came from, how far [m] and fast [m/s] it went."""

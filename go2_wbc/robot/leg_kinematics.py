@@ -49,18 +49,12 @@ from go2_wbc.robot.model import LEG_AXES, RobotModel
 
 @dataclass(frozen=True, slots=True)
 class LegGeometry:
-    """Lengths of a leg.
+    """Lengths of a leg."""
 
-    Attributes:
-        p_base_hip: origin of the hip's axis in the base frame [m].
-        width: distance [m] from the hip's axis to the plane of the leg, positive to the left.
-        thigh, calf: from the thigh's axis to the knee, and from there to the foot's centre [m].
-    """
-
-    p_base_hip: Array3
-    width: float
-    thigh: float
-    calf: float
+    p_base_hip: Array3  #: origin of the hip's axis in the base frame [m]
+    width: float  #: distance [m] from the hip's axis to the plane of the leg, positive to the left
+    thigh: float  #: from the thigh's axis to the knee [m]
+    calf: float  #: and from there to the foot's centre [m]
 
     @staticmethod
     def of(model: RobotModel, leg: Leg) -> LegGeometry:

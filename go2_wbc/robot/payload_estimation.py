@@ -110,16 +110,11 @@ class PayloadNumbers:
 
 
 class PayloadWrench(Record):
-    """What a payload takes of the standing feet, in the base frame.
+    """What a payload takes of the standing feet, in the base frame."""
 
-    Attributes:
-        force, moment: [N], and about the base's origin [N m].
-        weight: of a unit of mass, by gravity and the base's acceleration [m/s^2].
-    """
-
-    force: Array3
-    moment: Array3
-    weight: Array3
+    force: Array3  #: [N]
+    moment: Array3  #: about the base's origin [N m]
+    weight: Array3  #: of a unit of mass, by gravity and the base's acceleration [m/s^2]
 
 
 @subroutine

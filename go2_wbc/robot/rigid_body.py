@@ -46,14 +46,10 @@ from go2_wbc.validation import FINITE, NOT_NEGATIVE, ranged
 @dataclass(frozen=True, slots=True)
 @ranged(mass=NOT_NEGATIVE, place=FINITE)
 class Payload:
-    """A point mass that is fixed to the trunk.
+    """A point mass that is fixed to the trunk."""
 
-    Attributes:
-        mass, place: [kg], and in the base frame [m].
-    """
-
-    mass: float = 0.0
-    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    mass: float = 0.0  #: [kg]
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: in the base frame [m]
 
     @property
     def inertia(self) -> pin.Inertia:
@@ -73,29 +69,18 @@ _ZERO = (0.0, 0.0, 0.0)
 
 
 class RigidBodies(Record):
-    """The robot's numbers: of trunk, then hip, thigh and calf of each leg.
+    """The robot's numbers: of trunk, then hip, thigh and calf of each leg."""
 
-    Attributes:
-        mass, gravity, foot_radius: of all [kg], with the payload; [m/s^2]; [m].
-        link_mass: [kg]; the payload is in the trunk's, as in the next two.
-        link_moment: first moment [kg m].
-        link_inertia: as of a body [kg m^2].
-        p_joints: places of the joints [m] in the frame of the link before.
-        p_calf_feet: places of the feet's centres [m].
-        armature: inertia of the rotors [kg m^2].
-        payload: what the trunk carries.
-    """
-
-    mass: float
-    gravity: float
-    foot_radius: float
-    link_mass: Float[np.ndarray, "13"]
-    link_moment: Float[np.ndarray, "13 3"]
-    link_inertia: Float[np.ndarray, "13 6"]
-    p_joints: Float[np.ndarray, "12 3"]
-    p_calf_feet: Array4x3
-    armature: Array12
-    payload: Payload
+    mass: float  #: of all [kg], with the payload
+    gravity: float  #: [m/s^2]
+    foot_radius: float  #: [m]
+    link_mass: Float[np.ndarray, "13"]  #: [kg]; the payload is in the trunk's, as in the next two
+    link_moment: Float[np.ndarray, "13 3"]  #: first moment [kg m]
+    link_inertia: Float[np.ndarray, "13 6"]  #: as of a body [kg m^2]
+    p_joints: Float[np.ndarray, "12 3"]  #: places of the joints [m] in the frame of the link before
+    p_calf_feet: Array4x3  #: places of the feet's centres [m]
+    armature: Array12  #: inertia of the rotors [kg m^2]
+    payload: Payload  #: what the trunk carries
 
 
 @subroutine

@@ -80,19 +80,13 @@ class SteppingFoot(Record):
 
 
 class Landing(Record):
-    """Where a plan is, which landings move, and how its feet are.
+    """Where a plan is, which landings move, and how its feet are."""
 
-    Attributes:
-        anchor, origin: where the plan is now, and was at first.
-        feet: all of them.
-        missed, error: see ``Landings``.
-    """
-
-    anchor: Anchor
-    origin: Anchor
-    feet: tuple[SteppingFoot, SteppingFoot, SteppingFoot, SteppingFoot]
-    missed: float
-    error: float
+    anchor: Anchor  #: where the plan is now
+    origin: Anchor  #: where it was at first
+    feet: tuple[SteppingFoot, SteppingFoot, SteppingFoot, SteppingFoot]  #: all of them
+    missed: float  #: see ``Landings``
+    error: float  #: see ``Landings``
 
     @staticmethod
     def at(anchor: Anchor) -> Landing:

@@ -55,54 +55,37 @@ ROLL_PER_MOMENT, PITCH_PER_MOMENT = 0.08, 0.0085
 
 @dataclass(frozen=True, slots=True)
 class Deviation:
-    """How far a robot has been off its plan, on the average over the ticks so far.
+    """How far a robot has been off its plan, on the average over the ticks so far."""
 
-    Attributes:
-        place, attitude: of the tracked point [m], angle of the trunk [rad].
-        joints: angle [rad] of the worst joint of a raised leg, over the ticks that had one; None
-            if there was none.
-    """
-
-    place: float
-    attitude: float
+    place: float  #: of the tracked point [m]
+    attitude: float  #: angle of the trunk [rad]
     joints: float | None
+    """Angle [rad] of the worst joint of a raised leg, over the ticks that had one; None if there
+    was none."""
 
 
 class Correction(Record):
-    """What has been integrated.
+    """What has been integrated."""
 
-    Attributes:
-        offset: of the reference: position [m] and rotation vector [rad], in the world.
-        carried: what the offset would have to do against the payload that is known, in the heading
-            frame: upward [m], about the axis ahead and the one aside [rad].
-        knows_payload: whether ``carried`` has been found yet.
-    """
-
-    offset: Array6
+    offset: Array6  #: of the reference: position [m] and rotation vector [rad], in the world
     carried: Array3
-    knows_payload: bool
+    """What the offset would have to do against the payload that is known, in the heading frame:
+    upward [m], about the axis ahead and the one aside [rad]."""
+    knows_payload: bool  #: whether ``carried`` has been found yet
 
 
 class Tracking(Record):
-    """State of a plan that is followed.
+    """State of a plan that is followed."""
 
-    Attributes:
-        landing, correction: where the plan is, and its feet; of the trunk's target.
-        place, attitude, joints: see ``Deviation``.
-        ticks, raised_ticks: how many there have been, and of those with a raised leg.
-        sag: depth [m] of the tracked point below the plan, now.
-        lean: angle [rad] between the measured vertical of the trunk and the plan's, now.
-    """
-
-    landing: Landing
-    correction: Correction
-    place: float
+    landing: Landing  #: where the plan is, and its feet
+    correction: Correction  #: of the trunk's target
+    place: float  #: see ``Deviation``, as for the next two
     attitude: float
     joints: float
-    ticks: float
-    raised_ticks: float
-    sag: float
-    lean: float
+    ticks: float  #: how many there have been
+    raised_ticks: float  #: how many of them with a raised leg
+    sag: float  #: depth [m] of the tracked point below the plan, now
+    lean: float  #: angle [rad] between the measured vertical of the trunk and the plan's, now
 
 
 class PlanTracker:

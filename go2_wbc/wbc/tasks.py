@@ -57,15 +57,12 @@ class TaskRows(Record):
 
     The first three are of the trunk's place, then three of its attitude, then three of each leg,
     by what the leg does. Those of a leg have 0 in the columns of the others.
-
-    Attributes:
-        A: columns: the base's acceleration (6), and three unknowns of each leg (12).
-        b, weight: right side and weight of each row.
     """
 
     A: Float[np.ndarray, "18 18"]
-    b: Array18
-    weight: Array18
+    """Columns: the base's acceleration (6), and three unknowns of each leg (12)."""
+    b: Array18  #: right side of each row
+    weight: Array18  #: of each row
 
     def of_decision(self, which: list[int], reference: Reference) -> Rows:
         """Some of the rows, as rows of the decision z."""

@@ -126,38 +126,25 @@ radius below the foot's centre, and the direction of the axes of thigh and calf.
 
 @dataclass(frozen=True, slots=True)
 class LoadNumbers:
-    """What the shares of the load depend on, besides the robot's geometry.
+    """What the shares of the load depend on, besides the robot's geometry."""
 
-    Attributes:
-        evenness: weight of an even share, against 1 of the wrench.
-        weight, force_max, foot_radius: of the robot [N], greatest normal force [N] of a foot, [m].
-    """
-
-    evenness: float
-    weight: float
-    force_max: float
-    foot_radius: float
+    evenness: float  #: weight of an even share, against 1 of the wrench
+    weight: float  #: of the robot [N]
+    force_max: float  #: greatest normal force [N] of a foot
+    foot_radius: float  #: [m]
 
 
 class LoadedFeet(NamedTuple):
-    """The feet that bear something at an instant, one after the other; there are k of them.
+    """The feet that bear something at an instant, one after the other; there are k of them."""
 
-    Attributes:
-        leg: of each.
-        share: of the load that each may bear.
-        load: what each is expected to bear, over their mean.
-        points: of all legs, see ``LegPoints``.
-        A: the wrench on the base of a force on each foot along each of the world's axes.
-        f, missing: their forces [N], and what these leave of the wrench.
-    """
-
-    leg: Int[np.ndarray, "4"]
-    share: Array4
-    load: Array4
-    points: Float[np.ndarray, "4 5 3"]
+    leg: Int[np.ndarray, "4"]  #: of each
+    share: Array4  #: of the load that each may bear
+    load: Array4  #: what each is expected to bear, over their mean
+    points: Float[np.ndarray, "4 5 3"]  #: of all legs, see ``LegPoints``
     A: Float[np.ndarray, "6 12"]
-    f: Array12
-    missing: Array6
+    """The wrench on the base of a force on each foot along each of the world's axes."""
+    f: Array12  #: their forces [N]
+    missing: Array6  #: what these leave of the wrench
 
 
 @subroutine

@@ -177,17 +177,12 @@ def _geometry(description: RobotDescription, _written: tuple[int, ...]) -> pin.G
 
 @dataclass(frozen=True, slots=True)
 class LinkHull:
-    """The hull of one link.
+    """The hull of one link."""
 
-    Attributes:
-        name, joint: "trunk", or leg and part, and Pinocchio's number of the joint that carries it.
-        corners, box: (k, 3) in that joint's frame [m], and (8, 3) those of the box around them.
-    """
-
-    name: str
-    joint: int
-    corners: Float[np.ndarray, "k 3"]
-    box: Float[np.ndarray, "8 3"]
+    name: str  #: "trunk", or leg and part
+    joint: int  #: Pinocchio's number of the joint that carries it
+    corners: Float[np.ndarray, "k 3"]  #: (k, 3) in that joint's frame [m]
+    box: Float[np.ndarray, "8 3"]  #: (8, 3) corners of the box around them [m]
 
     @staticmethod
     def of(joint: int, points: Float[np.ndarray, "m 3"]) -> LinkHull:

@@ -90,21 +90,14 @@ class Forces:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A movement that is judged.
+    """A movement that is judged."""
 
-    Attributes:
-        path, forces: the movement, and what it takes.
-        model: the robot that it was planned for.
-        heavy: the robot that does it, with the load of the world.
-        world, limits: with the worst of what is uncertain, and what must be kept.
-    """
-
-    path: Trajectory
-    forces: Forces
-    model: RobotModel
-    heavy: RobotModel
-    world: World = World()
-    limits: FeasibilityLimits = FeasibilityLimits()
+    path: Trajectory  #: the movement
+    forces: Forces  #: what it takes
+    model: RobotModel  #: the robot that it was planned for
+    heavy: RobotModel  #: the robot that does it, with the load of the world
+    world: World = World()  #: with the worst of what is uncertain
+    limits: FeasibilityLimits = FeasibilityLimits()  #: what must be kept
 
     def series(
         self,

@@ -23,16 +23,11 @@ _Places = Float[np.ndarray, "n1 4 3"]
 
 @dataclass(frozen=True, slots=True)
 class Misses:
-    """Of trunk and feet, at k instants; nan where nothing was asked.
+    """Of trunk and feet, at k instants; nan where nothing was asked."""
 
-    Attributes:
-        times: (k,) after the start of the span [s].
-        away, turned: (k, 5) distances [m], and angles [rad], of the trunk only.
-    """
-
-    times: Float[np.ndarray, " k"]
-    away: Float[np.ndarray, "k 5"]
-    turned: Float[np.ndarray, "k 5"]
+    times: Float[np.ndarray, " k"]  #: (k,) after the start of the span [s]
+    away: Float[np.ndarray, "k 5"]  #: (k, 5) distances [m]
+    turned: Float[np.ndarray, "k 5"]  #: (k, 5) angles [rad], of the trunk only
 
 
 def misses_of(span: DynamicSpan, places: _Places, model: RobotModel) -> Misses:

@@ -40,16 +40,12 @@ FILE = Path(__file__).with_name("probability.json")
 
 @dataclass(frozen=True, slots=True)
 class Rise:
-    """The curve of one check.
-
-    Attributes:
-        unit: margin, in its own unit, up to which the curve is over the margin itself; above 0.
-        centre, width: ``asinh(margin / unit)`` with an even chance; of the rise, above 0.
-    """
+    """The curve of one check."""
 
     unit: float
-    centre: float
-    width: float
+    """Margin, in its own unit, up to which the curve is over the margin itself; above 0."""
+    centre: float  #: ``asinh(margin / unit)`` with an even chance
+    width: float  #: of the rise, above 0
 
     def chance(self, margin: float) -> float:
         """The chance that a margin stands for."""

@@ -129,19 +129,14 @@ ON_GROUND = LegTarget(Frame.GROUND, (0.0, 0.0, 0.0))  #: The foot where it stand
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """One move of one track.
-
-    Attributes:
-        start, end: when [s].
-        ease: how it goes from the last goal to this one.
-    """
+    """One move of one track."""
 
     instants: ClassVar[tuple[str, ...]] = ("start", "end")
     moves: ClassVar[str]  #: What moves, in words
 
-    start: float
-    end: float
-    ease: Easing
+    start: float  #: when [s]
+    end: float  #: when [s]
+    ease: Easing  #: how it goes from the last goal to this one
 
     @property
     def track(self) -> str:

@@ -175,21 +175,14 @@ def nearest(times: Times, t: float) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stepping:
-    """What is known of a stretch in which feet step, at n instants.
+    """What is known of a stretch in which feet step, at n instants."""
 
-    Attributes:
-        times, p_com: increasing, evenly [s]; (n, 3) where the CoM would be [m].
-        stance, p_feet: (n, 4) feet that stand, and (n, 4, 3) where the feet are [m].
-        gravity: [m/s^2].
-        bias: (n, 2) zero-moment point less that of the pendulum [m].
-    """
-
-    times: Times
-    p_com: Float[np.ndarray, "n 3"]
-    stance: Bool[np.ndarray, "n 4"]
-    p_feet: Float[np.ndarray, "n 4 3"]
-    gravity: float
-    bias: Float[np.ndarray, "n 2"]
+    times: Times  #: (n,) increasing, evenly [s]
+    p_com: Float[np.ndarray, "n 3"]  #: (n, 3) where the CoM would be [m]
+    stance: Bool[np.ndarray, "n 4"]  #: (n, 4) feet that stand
+    p_feet: Float[np.ndarray, "n 4 3"]  #: (n, 4, 3) where the feet are [m]
+    gravity: float  #: [m/s^2]
+    bias: Float[np.ndarray, "n 2"]  #: (n, 2) zero-moment point less that of the pendulum [m]
 
     @property
     def lever(self) -> Times:

@@ -116,22 +116,16 @@ class DynamicSpan:
 
 @dataclass(frozen=True, slots=True)
 class SpanSamples:
-    """A span at k instants.
+    """A span at k instants."""
 
-    Attributes:
-        q, v: (k, 19), (k, 18) states, between the knots as the solver steps.
-        a: (k, 18) accelerations.
-        tau, forces: (k, 12) torques [N m], (k, 4, 3) forces of the ground on the feet [N].
-        v_motors: (k, 12) joint speeds [rad/s] at which the motors must give the torques: of those
-            at both ends of the step, through which a torque holds, the one at which they give less.
-    """
-
-    q: Float[np.ndarray, "k 19"]
-    v: Float[np.ndarray, "k 18"]
-    a: Float[np.ndarray, "k 18"]
-    tau: Float[np.ndarray, "k 12"]
-    forces: Float[np.ndarray, "k 4 3"]
+    q: Float[np.ndarray, "k 19"]  #: (k, 19) configurations, between the knots as the solver steps
+    v: Float[np.ndarray, "k 18"]  #: (k, 18) velocities, likewise
+    a: Float[np.ndarray, "k 18"]  #: (k, 18) accelerations
+    tau: Float[np.ndarray, "k 12"]  #: (k, 12) torques [N m]
+    forces: Float[np.ndarray, "k 4 3"]  #: (k, 4, 3) forces of the ground on the feet [N]
     v_motors: Float[np.ndarray, "k 12"]
+    """(k, 12) joint speeds [rad/s] at which the motors must give the torques: of those at both ends
+    of the step, through which a torque holds, the one at which they give less."""
 
 
 def placed(trajectory: DynamicTrajectory, anchor: Anchor) -> DynamicTrajectory:
@@ -211,16 +205,11 @@ class Problem:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanSamples(Wanted):
-    """The part of many references that says where the robot shall be.
+    """The part of many references that says where the robot shall be."""
 
-    Attributes:
-        times, stance: (n,) [s], (n, 4) feet that stand.
-        normal_force_max: (n, 4) greatest normal force [N] of each foot.
-    """
-
-    times: Float[np.ndarray, " n"]
-    stance: Bool[np.ndarray, "n 4"]
-    normal_force_max: Float[np.ndarray, "n 4"]
+    times: Float[np.ndarray, " n"]  #: (n,) [s]
+    stance: Bool[np.ndarray, "n 4"]  #: (n, 4) feet that stand
+    normal_force_max: Float[np.ndarray, "n 4"]  #: (n, 4) greatest normal force [N] of each foot
 
     @staticmethod
     def one_by_one(

@@ -62,16 +62,12 @@ SAME_POSE = 1e-4  #: Difference [m, rad] of configurations that counts as none; 
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A part of a motion, from rest to rest.
+    """A part of a motion, from rest to rest."""
 
-    Attributes:
-        first, last, start, end: rows of its path, and when [s] in the motion.
-    """
-
-    first: int
-    last: int
-    start: float
-    end: float
+    first: int  #: row of its path
+    last: int  #: row of its path
+    start: float  #: when [s] in the motion
+    end: float  #: when [s] in the motion
 
     def written(self, path: Trajectory) -> PlanTarget:
         """What is written there; a foot that leaves at the motion's first instant stands then.

@@ -125,17 +125,12 @@ class JointPaths:
 
 @dataclass(frozen=True, slots=True)
 class Instants:
-    """Where trunk and feet are at n increasing instants.
+    """Where trunk and feet are at n increasing instants."""
 
-    Attributes:
-        times, p_base, R: (n,) [s], (n, 3) place of the base [m], (n, 3, 3) its attitude.
-        ground: where the feet stand.
-    """
-
-    times: Times
-    p_base: Float[np.ndarray, "n 3"]
-    R: Float[np.ndarray, "n 3 3"]
-    ground: Ground
+    times: Times  #: (n,) [s]
+    p_base: Float[np.ndarray, "n 3"]  #: (n, 3) place of the base [m]
+    R: Float[np.ndarray, "n 3 3"]  #: (n, 3, 3) its attitude
+    ground: Ground  #: where the feet stand
 
     @staticmethod
     def of(times: Times, body: Poses, ground: Ground) -> Instants:

@@ -31,30 +31,22 @@ CENTRING_STEPS = 5  #: Steps that put the CoM in its place; see ``place``
 
 @dataclass(frozen=True, slots=True)
 class Trajectory:
-    """A motion of the whole robot, in the frame of the motion.
+    """A motion of the whole robot, in the frame of the motion."""
 
-    Attributes:
-        times: (n,) [s].
-        q: (n, 19) position, quaternion, joints. v, a: (n, 18) its velocity and acceleration, both
-            of the base in its own frame.
-        rpy, p_com: (n, 3) roll, pitch, yaw [rad] of the trunk, and (n, 3) CoM [m].
-        stance, load_share: (n, 4) feet that stand, and share of its load that each may bear.
-        p_feet: (n, 4, 3) where the feet are [m] of legs that do not follow their joints.
-        miss: (n, 4) distance [m] by which such a foot is out of its leg's reach.
-        is_dynamic: (n,) instants in spans that obey the whole robot's dynamics, of which they are.
-    """
-
-    times: Float[np.ndarray, " n"]
-    q: Float[np.ndarray, "n 19"]
-    v: Float[np.ndarray, "n 18"]
-    a: Float[np.ndarray, "n 18"]
-    rpy: Float[np.ndarray, "n 3"]
-    p_com: Float[np.ndarray, "n 3"]
-    stance: Bool[np.ndarray, "n 4"]
-    load_share: Float[np.ndarray, "n 4"]
+    times: Float[np.ndarray, " n"]  #: (n,) [s]
+    q: Float[np.ndarray, "n 19"]  #: (n, 19) position, quaternion, joints
+    v: Float[np.ndarray, "n 18"]  #: (n, 18) its velocity, of the base in its own frame
+    a: Float[np.ndarray, "n 18"]  #: (n, 18) its acceleration, likewise
+    rpy: Float[np.ndarray, "n 3"]  #: (n, 3) roll, pitch, yaw [rad] of the trunk
+    p_com: Float[np.ndarray, "n 3"]  #: (n, 3) CoM [m]
+    stance: Bool[np.ndarray, "n 4"]  #: (n, 4) feet that stand
+    load_share: Float[np.ndarray, "n 4"]  #: (n, 4) share of its load that each may bear
     p_feet: Float[np.ndarray, "n 4 3"]
+    """(n, 4, 3) where the feet are [m] of legs that do not follow their joints."""
     miss: Float[np.ndarray, "n 4"]
+    """(n, 4) distance [m] by which such a foot is out of its leg's reach."""
     is_dynamic: Bool[np.ndarray, " n"]
+    """(n,) instants in spans that obey the whole robot's dynamics, of which they are."""
 
     __repr__ = brief
 

@@ -31,17 +31,12 @@ _DRAWN, _FADES, _NEAR = 2.6, 1.4, 0.35  # [m] from the target, and ahead of the 
 
 
 class Grid(NamedTuple):
-    """Heights of a rectangle of ground.
+    """Heights of a rectangle of ground."""
 
-    Attributes:
-        x, y, cell: of the middle of its first cell, and side of a cell [m].
-        z: heights [m] of the cells along x and y, nan where none is known.
-    """
-
-    x: float
-    y: float
-    cell: float
-    z: Float[np.ndarray, "n k"]
+    x: float  #: of the middle of its first cell [m]
+    y: float  #: likewise [m]
+    cell: float  #: side of a cell [m]
+    z: Float[np.ndarray, "n k"]  #: heights [m] of the cells along x and y, nan where none is known
 
     def points(self) -> Float[np.ndarray, "n k 3"]:
         """Middles of all cells [m]."""

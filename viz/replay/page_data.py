@@ -211,17 +211,12 @@ WORLD, BASE = "world", "base"
 
 
 class Link(NamedTuple):
-    """A link that moves, by its name in the URDF.
-
-    Attributes:
-        name, parent: of it and of the link that it hangs on, ``world`` for the base.
-        p, quaternion: (n, 3), (n, 4) its place [m] and orientation x y z w in the parent's frame.
-    """
+    """A link that moves, by its name in the URDF."""
 
     name: str
-    parent: str
-    p: Float[np.ndarray, "n 3"]
-    quaternion: Float[np.ndarray, "n 4"]
+    parent: str  #: the link that it hangs on, ``world`` for the base
+    p: Float[np.ndarray, "n 3"]  #: (n, 3) its place [m] in the parent's frame
+    quaternion: Float[np.ndarray, "n 4"]  #: (n, 4) its orientation x y z w in the parent's frame
 
 
 def links_of(model: pin.Model, q: Float[np.ndarray, "n 19"]) -> tuple[Link, ...]:

@@ -89,31 +89,20 @@ def bin_forces(
 
 @dataclass(frozen=True, slots=True)
 class MujocoLayout:
-    """Index tables of one compiled model.
+    """Index tables of one compiled model."""
 
-    Attributes:
-        base: id of the base body, the one with the free joint.
-        base_q, base_v: the free joint's 7 entries of ``qpos``, and 6 of ``qvel``.
-        joint_q: entries of ``qpos`` in the order of ``JOINT_NAMES``.
-        joint_v: entries of ``qvel``, likewise.
-        motors: entries of ``ctrl``, likewise.
-        torque_limits: least of motor, joint and given limits [N m].
-        foot_geoms: one geom of each foot, whose centre is the foot's position.
-        foot_bodies: the body that carries each foot's geom.
-        geom_codes: for each geom its contact bin: 0 to 3 a foot, ``TRUNK_BIN``, ``LIMB_BIN``; or
-            ``FOREIGN`` if it does not belong to the robot.
-    """
-
-    base: int
-    base_q: slice
-    base_v: slice
-    joint_q: Int[np.ndarray, "12"]
-    joint_v: Int[np.ndarray, "12"]
-    motors: Int[np.ndarray, "12"]
-    torque_limits: Float[np.ndarray, "12"]
-    foot_geoms: Int[np.ndarray, "4"]
-    foot_bodies: Int[np.ndarray, "4"]
+    base: int  #: id of the base body, the one with the free joint
+    base_q: slice  #: the free joint's 7 entries of ``qpos``
+    base_v: slice  #: and 6 of ``qvel``
+    joint_q: Int[np.ndarray, "12"]  #: entries of ``qpos`` in the order of ``JOINT_NAMES``
+    joint_v: Int[np.ndarray, "12"]  #: entries of ``qvel``, likewise
+    motors: Int[np.ndarray, "12"]  #: entries of ``ctrl``, likewise
+    torque_limits: Float[np.ndarray, "12"]  #: least of motor, joint and given limits [N m]
+    foot_geoms: Int[np.ndarray, "4"]  #: one geom of each foot, whose centre is the foot's position
+    foot_bodies: Int[np.ndarray, "4"]  #: the body that carries each foot's geom
     geom_codes: Int[np.ndarray, " ngeom"]
+    """For each geom its contact bin: 0 to 3 a foot, ``TRUNK_BIN``, ``LIMB_BIN``; or ``FOREIGN`` if
+    it does not belong to the robot."""
 
 
 def find_layout(

@@ -357,18 +357,12 @@ def _add_geoms(
 
 
 class DrawnShape(NamedTuple):
-    """A shape that MuJoCo's own viewer shows.
+    """A shape that MuJoCo's own viewer shows."""
 
-    Attributes:
-        joint: that moves it; empty for the trunk.
-        link, mesh: names of its body and its mesh.
-        T_base_shape: its pose in the base frame when all joints are at 0.
-    """
-
-    joint: str
-    link: str
-    mesh: str
-    T_base_shape: Float[np.ndarray, "4 4"]
+    joint: str  #: that moves it; empty for the trunk
+    link: str  #: name of its body
+    mesh: str  #: name of its mesh
+    T_base_shape: Float[np.ndarray, "4 4"]  #: its pose in the base frame when all joints are at 0
 
 
 def drawn_shapes(mjcf: Path | str) -> tuple[dict[str, MeshPart], list[DrawnShape]]:
