@@ -17,8 +17,17 @@ from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, u
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant, Scan
 from go2_wbc.plant.faults import HELD_TIME, Faults, InjectedFault
-from go2_wbc.plant.mujoco.forces import Contacts, FootContacts, Pushes, foot_contacts
-from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN, bin_forces, read_joints
+from go2_wbc.plant.mujoco.forces import (
+    LIMB_BIN,
+    ROBOT_BINS,
+    TRUNK_BIN,
+    Contacts,
+    FootContacts,
+    Pushes,
+    bin_forces,
+    foot_contacts,
+    read_joints,
+)
 from go2_wbc.plant.mujoco.lidar import DepthConfig, LidarConfig, RangeSensor, chosen
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
 from go2_wbc.plant.mujoco.setup import PlantSetup, SavedPhysics, prepare, settle

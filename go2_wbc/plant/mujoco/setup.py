@@ -25,8 +25,7 @@ from go2_wbc.errors import ConfigError, DescriptionError, ModelMismatch, unknown
 from go2_wbc.files import write_atomically
 from go2_wbc.legs import LEGS
 from go2_wbc.machine_code import kernel_folder
-from go2_wbc.plant.mujoco.forces import Push
-from go2_wbc.plant.mujoco.layout import MujocoLayout, find_layout, foot_geoms
+from go2_wbc.plant.mujoco.forces import MujocoLayout, Push, find_layout, foot_geoms
 from go2_wbc.plant.mujoco.model import (
     DEFAULT_FRICTION,
     JointDynamics,

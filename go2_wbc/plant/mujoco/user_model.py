@@ -22,7 +22,7 @@ from jaxtyping import Float
 
 from go2_wbc.errors import ModelMismatch
 from go2_wbc.legs import JOINT_NAMES, LEGS
-from go2_wbc.plant.mujoco.layout import foot_geoms, is_on_joint
+from go2_wbc.plant.mujoco.forces import foot_geoms, is_on_joint
 from go2_wbc.plant.mujoco.model import (
     DEFAULT_FRICTION,
     GYRO,
