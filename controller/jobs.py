@@ -68,11 +68,6 @@ class JobServer(Generic[Robot]):
 
     Any thread may submit, cancel and damp, also while a job is carried out. That happens in the
     thread that calls ``work``, or in one of the server's own after ``start``; never in both.
-
-    Attributes:
-        robot: that carries them out.
-        job: what is being prepared or carried out, or None.
-        last: what came of the last job whose turn came, or None.
     """
 
     def __init__(self, robot: Robot, *, queue: int = 0, patience: float = math.inf) -> None:
@@ -83,10 +78,10 @@ class JobServer(Generic[Robot]):
             queue: jobs that may wait for their turn; with 0 a second one is refused.
             patience: time [s] after which ``expire`` answers a job that is not over.
         """
-        self.robot = robot
-        self.last: Outcome | None = None
+        self.robot = robot  #: that carries them out
+        self.last: Outcome | None = None  #: what came of the last job whose turn came, or None
         self._queue, self._patience = queue, patience
-        self.job: Job | None = None
+        self.job: Job | None = None  #: what is being prepared or carried out, or None
         self._waiting: deque[Job] = deque()
         self._changed = threading.Condition()
         self._end = ""

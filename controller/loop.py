@@ -53,17 +53,7 @@ class Fault:
 
 
 class ControlLoop:
-    """Runs one behaviour at a time on a plant.
-
-    Attributes:
-        behaviour: what the robot does now.
-        snapshot: of the last tick; of a simulated robot when the tick's command acts.
-        latency: how late that is.
-        fault: why the last behaviour was ended by the loop, or None.
-        health: which parts are broken.
-        heights: of the ground, as it has been seen.
-        warn: writes a line of the log, as ``logging.Logger.warning`` does.
-    """
+    """Runs one behaviour at a time on a plant."""
 
     def __init__(
         self,
@@ -95,25 +85,27 @@ class ControlLoop:
         self._safety = safety
         self._falls = FallDetector(safety, model.profile)
         self._sag = self._lean = 0.0
-        self.fault: Fault | None = None
-        self.warn: Callable[..., None] = _log.warning
+        self.fault: Fault | None = None  #: why the last behaviour was ended by the loop, or None
+        self.warn: Callable[..., None] = _log.warning  #: writes a line of the log
         self.state: RobotState = plant.read()
         if not _is_plausible(self.state):
             raise PlantError(f"the first state of the plant is not finite: q={self.state.q}")
         self.snapshot: Snapshot = model.snapshot(self.state)
-        self.latency = Latency(plant.control_period)
+        """Of the last tick; of a simulated robot when the tick's command acts."""
+        self.latency = Latency(plant.control_period)  #: how late that is
         self._ahead = self.state
-        self.heights = HeightMap()
+        self.heights = HeightMap()  #: of the ground, as it has been seen
         self._past: deque[RobotState] = deque(maxlen=OLDEST_SCAN)
         self._payloads = payloads
         self._motors, self._held = MotorWatch(model.motor), np.zeros(4)
         self._feet = FootWatch(model.mass * model.gravity)
-        self.health = Health()
+        self.health = Health()  #: which parts are broken
         self._commands = deque([JointCommand.damping(DAMPING)], LAGS)
         self._unanswered = 0
         self._qp_failures_in_a_row, self._grave_since = 0, inf
         is_up = self.state.tilt < safety.tilt_limit  # one that is found on its back has not fallen
         self.behaviour: Behaviour = Damped("lying", stays_on_belly=is_up)
+        """What the robot does now."""
         self.engage(self.behaviour)
 
     def engage(self, behaviour: Behaviour, *, observe: bool = True) -> None:

@@ -23,17 +23,13 @@ GREATEST_DISTANCE = 100.0
 
 
 class Goal(ABC):
-    """A walk with a measured goal.
-
-    Attributes:
-        name: says what is walked.
-        time_limit: time [s] in which it must end: three times as long as at full speed.
-    """
+    """A walk with a measured goal."""
 
     def __init__(self, name: str, asked: float, speed: float) -> None:
         """Args: asked: way or angle, walked at ``speed`` per second."""
         self.name, self._asked = name, asked
         self.time_limit = 3.0 * abs(asked) / speed + 8.0
+        """Time [s] in which it must end: three times as long as at full speed."""
 
     def begin(self, state: RobotState) -> None:
         """Note where it starts."""

@@ -60,16 +60,12 @@ def _share(axes: tuple[float, ...], axis: int) -> float:
 
 @final
 class Gamepad:
-    """The first gamepad that pygame finds.
-
-    Attributes:
-        name: what it calls itself.
-    """
+    """The first gamepad that pygame finds."""
 
     def __init__(self, pygame: Any) -> None:  # noqa: ANN401 - a module of an extra
         self._pygame, self._stick = pygame, pygame.joystick.Joystick(0)
         self._stick.init()
-        self.name = str(self._stick.get_name())
+        self.name = str(self._stick.get_name())  #: what it calls itself
         self._held: frozenset[int] = frozenset()
 
     def read(self) -> PadReading | None:

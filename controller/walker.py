@@ -19,16 +19,13 @@ CHANGE_SHARE = 0.65
 
 
 class Walker:
-    """Lets a robot walk, in one gait after the other.
-
-    Attributes:
-        walking: the behaviour that walks, or will.
-    """
+    """Lets a robot walk, in one gait after the other."""
 
     def __init__(self, runner: Runner, config: Config) -> None:
         """Walk on ``runner``, at first with the trot."""
         self._runner, self._config = runner, config
         self.walking = Walking(runner.loop.model, find_gait("trot"), config.locomotion)
+        """The behaviour that walks, or will."""
         self._envelope = self._envelope_of(self.walking)
 
     def excess(self, command: VelocityCommand) -> tuple[int, str]:

@@ -200,14 +200,11 @@ class FeltWeight:
     Standing on four feet, the mean force of the ground is the mass times gravity and the mean
     acceleration, whose plan is known. The force is that which balances the joints' torques.
     What was felt before the first foot leaves the ground stays.
-
-    Attributes:
-        ratio: of the weights.
     """
 
     def __init__(self, friction: JointFriction) -> None:
         """Begin with the model's; ``friction`` is what the joints take of the motors' torques."""
-        self.ratio = 1.0
+        self.ratio = 1.0  #: of the weights
         self._friction = friction
         self._felt = self._planned = DOUBT * GRAVITY
         self._is_over = False

@@ -40,23 +40,14 @@ PROGRAM = "go2-wbc"  #: The name of the command line, and of the package
 
 
 class ExitCode(IntEnum):
-    """What the process tells its caller, whatever the command.
+    """What the process tells its caller, whatever the command."""
 
-    Attributes:
-        OK: it was done, or can be done.
-        FAILED: it was not done, or cannot be done.
-        USAGE: what was given cannot be used, an option, a name, a number or a file.
-        RUNTIME: something broke, or is missing on this machine.
-        INTERRUPTED: Ctrl-C, of what does not wait for it.
-        BROKEN_PIPE: who read the output has gone.
-    """
-
-    OK = 0
-    FAILED = 1
-    USAGE = 2
-    RUNTIME = 3
-    INTERRUPTED = 130
-    BROKEN_PIPE = 141
+    OK = 0  #: it was done, or can be done
+    FAILED = 1  #: it was not done, or cannot be done
+    USAGE = 2  #: what was given cannot be used, an option, a name, a number or a file
+    RUNTIME = 3  #: something broke, or is missing on this machine
+    INTERRUPTED = 130  #: Ctrl-C, of what does not wait for it
+    BROKEN_PIPE = 141  #: who read the output has gone
 
 
 def add_parser(

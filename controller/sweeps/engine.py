@@ -73,16 +73,12 @@ Ends = Generator[Ended[Item], None, None]
 
 @final
 class Trials(Generic[Item]):
-    """The items of a run, by their numbers: what is to be sent, and how often it was.
-
-    Attributes:
-        pickled, waiting: the items, to be sent, and those that no process has.
-    """
+    """The items of a run, by their numbers: what is to be sent, and how often it was."""
 
     def __init__(self, items: Sequence[Item], attempts: int) -> None:
         """All wait; one whose process dies is tried ``attempts`` times."""
-        self.pickled = [pickle.dumps(item) for item in items]
-        self.waiting = deque(range(len(items)))
+        self.pickled = [pickle.dumps(item) for item in items]  #: the items, to be sent
+        self.waiting = deque(range(len(items)))  #: those that no process has
         self._items, self._attempts, self._deaths = items, attempts, Counter[int]()
 
     def ended(self, number: int, answer: bytes) -> Ended[Item]:

@@ -277,9 +277,6 @@ class Clock(crocoddyl.CallbackAbstract):
 
     It knows no solver: solvers hold their callbacks where Python's garbage collector does not look,
     so that a way back would keep both for ever.
-
-    Attributes:
-        iterations: done so far.
     """
 
     def __init__(
@@ -290,7 +287,7 @@ class Clock(crocoddyl.CallbackAbstract):
     ) -> None:
         """Start; the budget is processor time [s]; ``binds`` says what is still in the way."""
         super().__init__()
-        self.iterations = 0
+        self.iterations = 0  #: done so far
         self._deadline = time.thread_time() + budget
         self._first = time.thread_time() + FIRST_ANSWER
         self._progress, self._binds = progress, binds

@@ -143,11 +143,7 @@ class Instants:
 
 
 class LegTracks:
-    """Evaluates the legs' tracks of a timeline along a path of the trunk.
-
-    Attributes:
-        footing: where the feet stand.
-    """
+    """Evaluates the legs' tracks of a timeline along a path of the trunk."""
 
     def __init__(
         self, timeline: Timeline, footing: Footing, model: RobotModel, home: Float[np.ndarray, "6"]
@@ -159,7 +155,7 @@ class LegTracks:
         for key in timeline.in_order(LegKey):
             self._keys[key.leg].append(key)
         self._starts = {leg: [key.start for key in keys] for leg, keys in self._keys.items()}
-        self.footing = footing
+        self.footing = footing  #: where the feet stand
         self._p_home, self._R_home = home[:3], attitudes(home[None, 3:])[0]
         self._keys = {leg: self._completed(leg, keys) for leg, keys in self._keys.items()}
 

@@ -50,11 +50,7 @@ class _Stream:
 
 
 class StatePublisher:
-    """Publishes the state of one robot.
-
-    Attributes:
-        counts: messages published so far, by topic.
-    """
+    """Publishes the state of one robot."""
 
     def __init__(
         self, node: Any, simulator: MujocoPlant, *, realtime: bool, sensors: str = "ideal"
@@ -68,7 +64,7 @@ class StatePublisher:
             sensors: of the simulator, which say the variances of its IMU.
         """
         self._node, self._simulator, self._realtime = node, simulator, realtime
-        self.counts: dict[str, int] = {}
+        self.counts: dict[str, int] = {}  #: messages published so far, by topic
         self._streams: list[_Stream] = []
         namespace = node.get_namespace().removeprefix("/")
         base, odom = f"{namespace}/base_link", f"{namespace}/odom"

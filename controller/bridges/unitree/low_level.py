@@ -144,12 +144,7 @@ def as_it_says(
 
 @final
 class CommandGate:
-    """Decides, tick by tick, whether the motors obey ``rt/lowcmd`` or the controller's own command.
-
-    Attributes:
-        is_open: whether low-level commands may take the robot over.
-        accepted, refused: number of good commands, and of refused ones by reason.
-    """
+    """Decides in each tick whether motors obey ``rt/lowcmd`` or the controller's own command."""
 
     def __init__(
         self,
@@ -158,9 +153,9 @@ class CommandGate:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """Guard joints with these limits [rad]; ``clock`` tells the wall clock's seconds."""
-        self.is_open = True
-        self.accepted = 0
-        self.refused: Counter[str] = Counter()
+        self.is_open = True  #: whether low-level commands may take the robot over
+        self.accepted = 0  #: number of good commands
+        self.refused: Counter[str] = Counter()  #: number of refused ones, by reason
         self._lower, self._upper, self._clock = lower, upper, clock
         self._last: JointCommand | None = None
         self._heard = -np.inf

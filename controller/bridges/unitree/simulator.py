@@ -72,11 +72,7 @@ class SimulatorSettings:
 
 @final
 class UnitreeSimulator:
-    """Serves a simulated robot until it is closed.
-
-    Attributes:
-        gate: who has the motors, with the counts of good and refused commands.
-    """
+    """Serves a simulated robot until it is closed."""
 
     def __init__(self, settings: SimulatorSettings) -> None:
         """Start serving.
@@ -99,7 +95,7 @@ class UnitreeSimulator:
             estimator=config.estimator,
         )
         model = RobotModel()
-        self.gate = CommandGate(model.q_lower, model.q_upper)
+        self.gate = CommandGate(model.q_lower, model.q_upper)  #: who has the motors
         self._plant = ServedPlant(inner, bus, self.gate, lockstep=settings.lockstep)
         self._robot = SportRobot(self._plant, config)
         self._is_released = False

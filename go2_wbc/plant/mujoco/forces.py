@@ -210,16 +210,12 @@ class Push:
 
 @final
 class Pushes:
-    """The pushes that act now on one model.
-
-    Attributes:
-        active: the pushes; each loses one step at every ``apply``.
-    """
+    """The pushes that act now on one model."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, layout: MujocoLayout) -> None:
         self._model, self._data, self._layout = model, data, layout
         self._wrenches = data.xfrc_applied  # a view, made once because making it is slow
-        self.active: tuple[Push, ...] = ()
+        self.active: tuple[Push, ...] = ()  #: each loses one step at every ``apply``
 
     def add(self, force: Float[np.ndarray, "3"], duration: float, at: str) -> None:
         """Starts a push at the next physics step; see ``MujocoPlant.push``."""
