@@ -33,7 +33,7 @@ from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant.faults import AXES
 from go2_wbc.plant.mujoco.ground_truth import FALLEN_TILT, TOUCH
 from go2_wbc.recording import true_runs
-from go2_wbc.robot.profile import GO2
+from go2_wbc.robot.description import GO2
 from motions import load_motion
 
 FIRST_SEED = 10100

@@ -37,7 +37,7 @@ FENCES: dict[str, tuple[str, ...]] = {
     "rclpy": ("controller/bridges/*",),
     "cyclonedds": ("controller/bridges/*",),
     "ray": ("controller/sweeps/ray_engine.py",),
-    "pyarrow": ("controller/sweeps/export.py",),
+    "pyarrow": ("controller/sweeps/run.py",),
     "mcap": ("viz/replay/mcap_file.py",),
     "rerun": ("viz/replay/rerun_file.py",),
     "sqlite3": ("controller/sweeps/sweep_file.py",),

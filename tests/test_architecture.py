@@ -98,7 +98,7 @@ def test_every_contract_catches_an_import_that_breaks_it(tmp_path: Path) -> None
         "go2_wbc/contacts.py": "from go2_wbc.planning import swing",
         "go2_wbc/attic.py": "",
         "controller/loop.py": "if TYPE_CHECKING:\n    import controller.cli",
-        "viz/render/camera.py": "from viz.replay import packing",
+        "viz/render/camera.py": "from viz.replay import page_data",
         "go2_wbc/wbc/tasks.py": "import go2_wbc.wbc.controller",
     }
     for name, statement in broken.items():
@@ -112,7 +112,7 @@ def test_every_contract_catches_an_import_that_breaks_it(tmp_path: Path) -> None
         "go2_wbc.contacts -> go2_wbc.planning.swing",
         "go2_wbc.attic",
         "controller.loop -> controller.cli",
-        "viz.render.camera -> viz.replay.packing",
+        "viz.render.camera -> viz.replay.page_data",
     ):
         assert clue in report
 

@@ -48,10 +48,8 @@ LEAST_MARGIN = 0.03
 steps: of 32 pushes of 36 to 45 N s 4 made it fall, at the edge itself 10, beyond it 11."""
 WELL_INSIDE = 0.06
 """Distance [m] of the capture point from the feet's middle within which it is not looked closer."""
-AT_ONCE = 1e-6
-"""Capture margin [m] of the planner: once it is asked to step it does."""
-MIRRORED_OFFSETS = (0.0, 0.5, 0.5, 0.0)
-"""Of a trot that begins with FL and RR on the ground."""
+AT_ONCE = 1e-6  #: Capture margin [m] of the planner: once it is asked to step it does
+MIRRORED_OFFSETS = (0.0, 0.5, 0.5, 0.0)  #: Of a trot that begins with FL and RR on the ground
 FIRST_PERIOD, FIRST_DUTY = 0.30, 0.40
 """Period [s] and duty of the first stride. Of 24 pushes of 36 to 45 N s 23 were held, and 16 with
 the stride of a slow trot (0.36 s, 0.5): feet that stand for 0.18 s are left 0.4 m behind."""
@@ -64,8 +62,7 @@ made it fall, 5 with the lower swings alone, 1 with the longer stances alone, wi
 KEPT_SPEED = 0.8
 """Share of its speed at which the robot is to go on: of 32 pushes all were held, with 0.7 28, and
 with 0.6 26."""
-SLOW = 0.3
-"""Speed [m/s] from which on it is to stop."""
+SLOW = 0.3  #: Speed [m/s] from which on it is to stop
 AT_ANY_RATE = 30.0
 """Greatest change of that command [m/s^2]: more than that of a velocity under a push."""
 SHORT_LEASH = 0.02
