@@ -205,4 +205,4 @@ BENCHMARK = Benchmark(
     takes="three hours on two cores",
     examples=("--rows rest --seeds 1", "--rows late-10-on-0.2"),
 )
-register, run = BENCHMARK.register, BENCHMARK.run
+run = BENCHMARK.run

@@ -54,7 +54,7 @@ def test_a_run_becomes_a_looping_film_that_starts_just_before_the_first_step() -
     run = gallery.from_first_step(synthetic_recording(script=(("stand", 1.5), ("walk", 1.4))))
     assert run.labels[0] == "stand"
     assert run.spans()[1].start == pytest.approx(gallery.LEAD, abs=0.02)
-    with Image.open(io.BytesIO(gallery.film(run))) as image:
+    with Image.open(io.BytesIO(gallery.film_of(run))) as image:
         assert image.info["loop"] == 0
         assert getattr(image, "n_frames", 1) == 1 + round(20.0 / gallery.FILM_SPEED)
 

@@ -19,7 +19,7 @@ from benchmarks.probability import (
     save_reliability,
     store,
 )
-from benchmarks.probability_fit import Sample, _loss, calibration, fit
+from benchmarks.probability_fit import Sample, _loss, calibration, fit_model
 from benchmarks.probability_runs import PAYLOAD, WORLDS, exam, mixed, runs, world_of
 from benchmarks.validation_set.drawing import TEST, TRAIN
 from controller.sweeps.sweep_file import Row
@@ -119,7 +119,7 @@ def test_the_gradient_of_the_loss_is_that_of_finite_differences() -> None:
 
 
 def test_the_fit_finds_what_made_the_data_and_is_calibrated_on_others() -> None:
-    model = fit(_samples(2, 4000))
+    model = fit_model(_samples(2, 4000))
     for name, rise in TRUTH.rises.items():
         found, even = model.rises[name], rise.unit * math.sinh(rise.centre)
         assert found.unit * math.sinh(found.centre) == pytest.approx(even, abs=0.3 * rise.unit)
