@@ -171,14 +171,11 @@ def test_every_beginning_of_the_exam_is_mixed_evenly(count: int) -> None:
         assert first[kind] == pytest.approx(total * count / len(asked), abs=2.0)
 
 
-def test_no_family_comes_again_in_a_stratum_before_all_have_come() -> None:
+def test_the_order_of_the_exam_is_mixed_and_loses_no_motion() -> None:
     of_one = [q for q in exam() if (q.family.half, q.stratum) == (TRAIN, "easy")]
     quasi_static = [q.family.name for q in of_one if not q.family.is_dynamic]
     families = set(quasi_static)
     assert set(quasi_static[: len(families)]) == families
-
-
-def test_mixing_loses_no_motion() -> None:
     asked = exam()
     assert sorted(q.name for q in mixed(asked[:50])) == sorted(q.name for q in asked[:50])
 

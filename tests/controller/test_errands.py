@@ -95,15 +95,12 @@ def test_an_errand_that_takes_long_is_no_loop_that_hangs(
     assert answer.result(HANG_GUARD) is True
 
 
-def test_what_was_asked_before_the_end_is_done_at_the_end(errands: Errands) -> None:
+def test_what_was_asked_before_the_end_is_done_and_later_or_unserved_not(errands: Errands) -> None:
     answer = in_thread(lambda: errands.ask(lambda: 1, HANG_GUARD))
     while errands._asked.empty():
         pass
     errands.end()
     assert answer.result(HANG_GUARD) == 1
-
-
-def test_what_is_asked_after_the_end_is_not_done(errands: Errands) -> None:
     done: list[int] = []
     errands.end()
     with pytest.raises(LoopEnded):

@@ -90,15 +90,12 @@ def test_a_solver_that_is_unknown_or_not_installed_is_refused_with_what_helps(
         GO2Controller(config=Config(wbc=replace(WbcConfig(), solver=solver)))
 
 
-def test_an_unknown_back_end_is_refused_with_the_valid_ones_and_the_plant_left_untouched(
+def test_an_unknown_back_end_and_a_plant_that_cannot_be_read_are_refused(
     plant: WatchedPlant,
 ) -> None:
     with pytest.raises(ConfigError, match="valid: condensed, full, placo"):
         GO2Controller(plant=plant, config=Config(backend="magic"))
     assert not plant.commands
-
-
-def test_a_plant_that_cannot_be_read_is_refused_at_once(plant: WatchedPlant) -> None:
     plant.close()
     with pytest.raises(ClosedError, match="plant is closed"):
         GO2Controller(plant=plant)
@@ -175,12 +172,9 @@ def test_a_task_of_ones_own_is_asked_in_plans_with_few_feet_too(plant: WatchedPl
         pilot.close()
 
 
-def test_placo_takes_no_tasks_of_ones_own(plant: WatchedPlant) -> None:
+def test_a_robot_rises_and_walks_by_placo_without_tasks_of_ones_own(plant: WatchedPlant) -> None:
     with pytest.raises(ConfigError, match="the placo back end"):
         GO2Controller(plant=plant, config=Config(backend="placo"), extra_tasks=[SteadyTrunk()])
-
-
-def test_a_robot_rises_and_walks_by_placo(plant: WatchedPlant) -> None:
     with GO2Controller(plant=plant, config=Config(backend="placo")) as go2:
         assert go2._runner.loop.wbc.backend_name == "placo"
         assert go2.walk()

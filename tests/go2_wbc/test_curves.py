@@ -109,12 +109,9 @@ def test_easing_out_is_easing_in_backwards(s: float) -> None:
     assert Ease.OUT.progress(1.0 - s) == pytest.approx((1.0 - value, slope, -bend), abs=EXACT)
 
 
-def test_easing_in_joins_a_linear_piece_of_twice_its_mean_speed_smoothly() -> None:
+def test_easing_in_joins_a_linear_piece_and_hold_stays_until_its_end() -> None:
     assert Ease.IN.progress(0.0) == (0.0, 0.0, 0.0)
     assert Ease.IN.progress(1.0) == pytest.approx((1.0, 2.0, 0.0), abs=EXACT)
-
-
-def test_hold_stays_until_its_end() -> None:
     assert [Ease.HOLD.progress(s)[0] for s in (0.0, 0.5, 0.999, 1.0)] == [0.0, 0.0, 0.0, 1.0]
 
 

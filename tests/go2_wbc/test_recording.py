@@ -44,14 +44,11 @@ def test_a_part_has_these_samples_of_every_field(
     assert part.duration == pytest.approx(0.2)
 
 
-def test_a_part_without_a_sample_is_empty(recording: Recording) -> None:
+def test_a_part_may_be_empty_and_labels_become_spans_without_gap(recording: Recording) -> None:
     part = recording.part(slice(5, None))
     assert len(part.time) == 0
     assert part.labels == ()
     assert part.duration == 0.0
-
-
-def test_equal_labels_become_one_span_and_spans_leave_no_gap(recording: Recording) -> None:
     spans = recording.spans()
     assert [span.label for span in spans] == ["stand", "bow", "stand"]
     assert [span.start for span in spans] == pytest.approx([0.0, 0.2, 0.4])

@@ -237,16 +237,13 @@ def test_the_filmstrip_shows_sitting_swinging_and_the_raised_paw() -> None:
     assert stance[rows[2]].tolist() == [True, False, True, True]
 
 
-def test_of_a_walk_over_a_terrain_the_filmstrip_shows_three_moments() -> None:
+def test_the_filmstrip_of_a_terrain_shows_three_moments_and_of_no_walk_what_it_chooses() -> None:
     go2 = FakeGo2()
     report = run_demo(go2)
     forward = replace(report.steps[3], name="cross")
     times = demo.filmstrip_times(replace(report, steps=(forward,)), go2.recording())
     start = forward.start - go2.recording().time[0]
     assert times == pytest.approx([start + 0.5, start + 1.0, start + 1.5])
-
-
-def test_a_run_without_these_moments_leaves_the_choice_to_the_filmstrip() -> None:
     go2 = FakeGo2(falls_in="walk")
     assert demo.filmstrip_times(run_demo(go2), go2.recording()) is None
 
@@ -300,22 +297,16 @@ def test_the_table_fits_80_columns_whatever_happens() -> None:
             assert max(map(len, lines)) <= COLUMNS
 
 
-def test_the_table_marks_every_step_and_gives_the_reason_of_a_failure() -> None:
+def test_the_table_marks_every_step_beside_what_was_measured_with_a_dash_for_nothing() -> None:
     report = run_demo(FakeGo2(refusals={"high_five": "the paw was not held at 0.62 m"}))
     text = render(report, "utf-8")
     assert text.count("✓") == 7
     assert text.count("✗") == 1
     assert "\n     the paw was not held at 0.62 m\n" in text
     assert "7 of 8 steps done." in text
-
-
-def test_asked_and_measured_stand_side_by_side_with_their_unit() -> None:
     text = render(run_demo(FakeGo2(speed_share=0.95)), "utf-8")
     row = next(line for line in text.splitlines() if "mean speed" in line)
     assert row.split()[-3:] == ["0.200", "0.190", "m/s"]
-
-
-def test_what_could_not_be_measured_is_a_dash() -> None:
     text = render(report_of(), "utf-8")
     assert "nan" not in text
     assert "least support margin   -" in text

@@ -36,8 +36,15 @@ def written(folder: Path, name: str) -> Path:
     return file
 
 
-def test_three_robots_ship() -> None:
+def test_robots_of_three_kinds_and_one_value_each_ship_and_others_are_refused(
+    tmp_path: Path,
+) -> None:
     assert profile_names() == ("a1", "go1", "go2")
+    file = tmp_path / "mine.toml"
+    file.write_text('robot = "b9"\n', encoding="utf-8")
+    for make in (lambda: find_profile("b9"), lambda: load_config(file)):
+        with pytest.raises(ConfigError, match="unknown robot 'b9'; valid: a1, go1, go2"):
+            make()
 
 
 @EVERY
@@ -88,14 +95,6 @@ def test_every_robot_can_raise_its_paw_and_bow(name: str) -> None:
     checker = FeasibilityChecker(model_of(name))
     assert checker.check("high_five").ok
     assert checker.check("bow").ok
-
-
-def test_an_unknown_robot_is_refused_with_those_that_are_known(tmp_path: Path) -> None:
-    file = tmp_path / "mine.toml"
-    file.write_text('robot = "b9"\n', encoding="utf-8")
-    for make in (lambda: find_profile("b9"), lambda: load_config(file)):
-        with pytest.raises(ConfigError, match="unknown robot 'b9'; valid: a1, go1, go2"):
-            make()
 
 
 def test_a_file_that_names_a_robot_begins_with_its_numbers(tmp_path: Path) -> None:

@@ -290,7 +290,7 @@ def test_the_problem_knows_who_contributed_which_rows(legs: tuple) -> None:
     assert problem.weights[3] == weight
 
 
-def test_solving_leaves_snapshot_and_reference_untouched_and_repeats_exactly() -> None:
+def test_a_solution_is_pure_torque_and_solving_repeats_exactly() -> None:
     controller = WholeBodyController(MODEL)
     snapshot, reference = next(cases(MODEL, 1, seed=51))
     before = [snapshot.mass_matrix.copy(), snapshot.bias.copy(), reference.p_world_feet.copy()]
@@ -299,9 +299,6 @@ def test_solving_leaves_snapshot_and_reference_untouched_and_repeats_exactly() -
     after = [snapshot.mass_matrix, snapshot.bias, reference.p_world_feet]
     for a, b in zip(before, after, strict=True):
         np.testing.assert_array_equal(a, b)
-
-
-def test_a_solution_is_commanded_as_pure_torque() -> None:
     solution = WholeBodyController(MODEL).solve(*STAND)
     np.testing.assert_array_equal(solution.command.tau, solution.tau_motors)
     assert not solution.command.kp.any()

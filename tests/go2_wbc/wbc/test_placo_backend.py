@@ -49,12 +49,17 @@ def test_both_back_ends_find_the_same_torques_forces_and_accelerations(foot_radi
         assert motion_error(snapshot, b) < MOTION_TOLERANCE
 
 
-def test_both_back_ends_keep_near_the_planned_forces() -> None:
+def test_both_back_ends_keep_near_planned_forces_and_ramp_them_to_zero_alike() -> None:
     rng, problems = np.random.default_rng(8), []
     for snapshot, plain in cases(MODEL, STATES // 3, seed=9):
         problems += [(snapshot, with_planned_forces(plain, rng)), (snapshot, plain)]  # and back
     for *_, a, b in solved_alike(*both(), problems, TORQUE_TOLERANCE):
         np.testing.assert_allclose(a.forces, b.forces, atol=FORCE_TOLERANCE, rtol=0)
+    snapshot, reference = standing(MODEL)
+    least, greatest = np.array([0.0, 5.0, 5.0, 5.0]), np.array([0.0, 250.0, 250.0, 250.0])
+    unloaded = replace(reference, normal_force_min=least, normal_force_max=greatest)
+    ((*_, b),) = solved_alike(*both(), [(snapshot, unloaded)], TORQUE_TOLERANCE)
+    np.testing.assert_allclose(b.forces[0], 0.0, atol=FORCE_TOLERANCE)
 
 
 def test_both_back_ends_keep_to_the_motors_line_where_joints_are_fast() -> None:
@@ -106,14 +111,6 @@ def test_a_joint_at_its_limit_is_treated_alike() -> None:
     found = list(solved_alike(*both(), problems, TORQUE_TOLERANCE))
     for off, (*_, b) in zip(beyond, found, strict=True):
         assert b.qdd[8] <= 0.0 or off < 0.0
-
-
-def test_a_foot_whose_normal_force_is_ramped_to_zero_is_treated_alike() -> None:
-    snapshot, reference = standing(MODEL)
-    least, greatest = np.array([0.0, 5.0, 5.0, 5.0]), np.array([0.0, 250.0, 250.0, 250.0])
-    unloaded = replace(reference, normal_force_min=least, normal_force_max=greatest)
-    ((*_, b),) = solved_alike(*both(), [(snapshot, unloaded)], TORQUE_TOLERANCE)
-    np.testing.assert_allclose(b.forces[0], 0.0, atol=FORCE_TOLERANCE)
 
 
 WHIRL = 3.0 * np.random.default_rng(1).normal(size=12)

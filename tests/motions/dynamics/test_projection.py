@@ -60,7 +60,7 @@ def test_the_deviation_is_what_a_look_at_the_path_says(
     assert sway.duration == pytest.approx(asked.times[-1])
 
 
-def test_what_can_be_done_is_done_as_written(
+def test_what_can_be_done_is_done_as_written_and_two_diagonal_feet_are_lifted(
     plans: dict[str, DynamicTrajectory], model: RobotModel
 ) -> None:
     slow = Timeline().body(y=0.03, roll=deg(5), over=0.5).home(over=0.5)
@@ -68,11 +68,6 @@ def test_what_can_be_done_is_done_as_written(
     assert plan.position_deviation < 0.003
     assert plan.angle_deviation < math.radians(0.5)
     assert plan.lag == 0.0
-
-
-def test_two_diagonal_feet_can_be_lifted(
-    plans: dict[str, DynamicTrajectory], model: RobotModel
-) -> None:
     plan = nearest(two_feet(model), model)
     assert all(reading.is_kept for reading in audit(plan, model))
     assert plan.position_deviation < 0.02

@@ -52,11 +52,15 @@ def failed(report: FeasibilityReport) -> set[str]:
 # --- plans broken on purpose ----------------------------------------------------------------------
 
 
-def test_a_good_plan_passes(good: CompiledPlan, checker: FeasibilityChecker) -> None:
+def test_a_good_plan_passes_and_one_that_is_not_a_number_does_not(
+    good: CompiledPlan, checker: FeasibilityChecker
+) -> None:
     report = checker.check(good)
     assert report.ok, report.table()
     report.raise_if_infeasible()
     assert all(finding.margin >= 0.0 for finding in report.margins.values())
+    report = checker.check(DoctoredPlan(good, aside=float("nan")))
+    assert not report.ok
 
 
 def test_a_joint_beyond_its_limit_is_found_at_its_worst_instant(
@@ -151,13 +155,6 @@ def test_causes_come_before_what_follows_from_them(
     # The jump of the trunk comes first, what is out of reach is the cause that is named first.
     assert report.failures[0].check == "way of a foot"
     assert report.failures[0].time > 1.0 > min(finding.time for finding in report.failures)
-
-
-def test_a_plan_that_is_not_a_number_is_infeasible(
-    good: CompiledPlan, checker: FeasibilityChecker
-) -> None:
-    report = checker.check(DoctoredPlan(good, aside=float("nan")))
-    assert not report.ok
 
 
 # --- timelines that the robot cannot do -----------------------------------------------------------
@@ -378,14 +375,13 @@ def test_two_raised_feet_have_no_margin(checker: FeasibilityChecker) -> None:
 SWAY = Timeline().body(y=0.03, over=0.5).home(over=0.5)
 
 
-def test_the_feet_carry_the_payload_too(model: RobotModel) -> None:
+def test_feet_carry_a_payload_too_that_moves_the_centre_of_mass_over_them(
+    model: RobotModel,
+) -> None:
     world = World(payload=3.0, mass_scale=1.05)
     checked = FeasibilityChecker(model, world=world).evaluate(SWAY)
     weight = (1.05 * model.mass + 3.0) * model.gravity
     assert checked.forces.contact[0, :, 2].sum() == pytest.approx(weight, abs=0.05)
-
-
-def test_a_payload_in_front_moves_the_centre_of_mass_over_the_feet(model: RobotModel) -> None:
     line = Timeline().foot("FR", z=0.06, over=0.6).hold(0.2).home(over=0.6)
     margins = [
         FeasibilityChecker(model, world=world).check(line).margins["support"].value
@@ -395,16 +391,13 @@ def test_a_payload_in_front_moves_the_centre_of_mass_over_the_feet(model: RobotM
     assert 0.01 < margins[0] - margins[1] < 0.05
 
 
-def test_what_is_uncertain_counts_at_its_worst(model: RobotModel) -> None:
+def test_what_is_uncertain_of_mass_and_floor_counts_at_its_worst(model: RobotModel) -> None:
     worlds = (World(), World(mass_uncertainty=0.2), World(mass_scale=1.2))
     torques = [
         FeasibilityChecker(model, world=world).check(SWAY).margins["torque"].value
         for world in worlds
     ]
     assert torques[0] < torques[1] == pytest.approx(torques[2], rel=1e-9)
-
-
-def test_what_is_uncertain_of_the_floor_counts_at_its_worst(model: RobotModel) -> None:
     world = World(friction=0.5, friction_uncertainty=0.2)
     margin = FeasibilityChecker(model, world=world).check(SWAY).margins["friction"]
     assert margin.limit == pytest.approx(0.4)
@@ -423,7 +416,7 @@ def test_joint_friction_asks_more_of_the_motors(model: RobotModel) -> None:
     assert np.abs(more[v == 0.0]).max(initial=0.0) == 0.0
 
 
-def test_a_slippery_floor_is_refused_and_named() -> None:
+def test_a_slippery_floor_is_refused_and_a_world_out_of_range_told() -> None:
     usual, slippery = check("wiggle"), check("wiggle", friction=0.05)
     assert usual.ok
     assert "holds for" not in usual.table()
@@ -432,6 +425,8 @@ def test_a_slippery_floor_is_refused_and_named() -> None:
     loaded = check(SWAY, payload=3.0, world=World(friction=0.6))
     assert loaded.world == World(friction=0.6, payload=3.0)
     assert loaded.as_dict()["world"]["payload"] == 3.0
+    with pytest.raises(ConfigError, match=r"World\.friction must be between 0\.0001 and 2, got 9"):
+        check(SWAY, friction=9.0)
 
 
 def test_the_table_is_narrow_in_every_world_and_says_what_no_limit_counts_with() -> None:
@@ -448,11 +443,6 @@ def test_the_table_is_narrow_in_every_world_and_says_what_no_limit_counts_with()
     assert str(world) in text.replace("\n", " ")
     assert "simulated only" in text
     assert "simulated only" not in check(SWAY, payload=2.0).table()
-
-
-def test_a_world_out_of_range_is_told() -> None:
-    with pytest.raises(ConfigError, match=r"World\.friction must be between 0\.0001 and 2, got 9"):
-        check(SWAY, friction=9.0)
 
 
 def test_a_load_that_brings_the_com_inside_does_not_help_a_controller_that_feels_it() -> None:

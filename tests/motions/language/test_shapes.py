@@ -101,12 +101,9 @@ def test_a_slower_motion_passes_the_same_places_later(name: str) -> None:
         assert curves_at(slow, 2 * t)[0] == pytest.approx(curves_at(fast, t)[0], abs=2e-3)
 
 
-def test_beats_last_longer_in_a_slower_motion() -> None:
+def test_slower_beats_last_longer_and_half_the_amplitude_is_half_the_way() -> None:
     line = Timeline().bpm(120).body(z=-0.02, over=1).scale_time(2.0).hold(1)
     assert line.end == pytest.approx(2.0)
-
-
-def test_half_the_amplitude_is_half_the_way() -> None:
     whole, half = (curves_at(plan_of(line), 0.6)[0] for line in (NOD, NOD.scale(0.5)))
     assert half[4] == pytest.approx(0.5 * whole[4], abs=NEAR)
     assert WAVE.scale(0.5).keys != WAVE.keys
@@ -160,7 +157,7 @@ def test_smaller_jumps_are_lower_and_shorter_and_what_follows_comes_sooner() -> 
         NOD.scale_jumps(0.5)
 
 
-def test_backwards_a_motion_passes_the_same_places_in_turn() -> None:
+def test_backwards_a_motion_passes_the_same_places_and_twice_is_itself() -> None:
     path = Timeline().body_path([{"x": 0.02}, {"x": -0.02}, {"x": 0.0}], over=2.0)
     for line in (NOD, WAVE, path):
         there, back = plan_of(line), plan_of(line.reverse())
@@ -168,16 +165,10 @@ def test_backwards_a_motion_passes_the_same_places_in_turn() -> None:
             mirrored = curves_at(back, there.duration - t)[0]
             assert mirrored == pytest.approx(curves_at(there, t)[0], abs=BALANCE)
         assert FeasibilityChecker(MODEL).check(line.reverse()).ok
-
-
-def test_backwards_entry_and_exit_change_places() -> None:
     down = Timeline(exit=Posture.SIT).posture("sit", over=1.5)
     up = down.reverse()
     assert (up.entry, up.exit) == (Posture.SIT, Posture.STAND)
     assert down.then(up).end == pytest.approx(3.0)
-
-
-def test_backwards_twice_is_the_motion_itself() -> None:
     for line in (NOD, WAVE):
         twice = line.reverse().reverse()
         assert written(twice) == written(line)

@@ -9,16 +9,13 @@ _CREASE = np.deg2rad(40.0)
 _RED = np.array([1.0, 0.0, 0.0])
 
 
-def test_a_cube_given_as_a_soup_keeps_its_sharp_edges() -> None:
+def test_a_cube_keeps_its_sharp_edges_and_a_sphere_becomes_smooth() -> None:
     box = trimesh.creation.box((0.2, 0.2, 0.2))
     soup = box.vertices[box.faces].reshape(-1, 3)
     surface = smooth_surface(soup, np.arange(36).reshape(12, 3), _RED, crease=_CREASE)
     assert len(surface.points) == 24
     np.testing.assert_allclose(np.abs(surface.normals).max(axis=1), 1.0)
     assert np.all(np.sum(surface.points * surface.normals, axis=1) > 0.09)
-
-
-def test_a_sphere_given_as_a_soup_becomes_smooth() -> None:
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
     soup = ball.vertices[ball.faces].reshape(-1, 3)
     surface = smooth_surface(soup, np.arange(len(soup)).reshape(-1, 3), _RED, crease=_CREASE)
