@@ -1,5 +1,6 @@
 """Contact forces of a motion: what they must be, and what another solver says they are."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -354,23 +355,19 @@ def test_a_twist_that_slips_and_a_fast_roll_that_creeps_are_refused(
     assert slip.value == pytest.approx(0.0131, rel=0.15)
 
 
-@pytest.mark.parametrize(("size", "over"), [(0.016, 0.28), (0.022, 0.35)])
-def test_a_sway_that_slips_by_less_than_a_millimetre_passes(
-    checker: FeasibilityChecker, size: float, over: float
-) -> None:
+@pytest.mark.parametrize(
+    ("channel", "size", "over", "slips"),
     # 0.3 and 0.5 mm; the controller's share of the load needs 0.56 and 0.48 for a moment.
-    report = checker.check(to_and_fro("y", size, over))
-    assert report.ok, report.table()
-    assert report.margins["slip"].value < 0.005
-
-
-@pytest.mark.parametrize(("size", "over"), [(0.25, 0.2), (0.286, 0.247)])
-def test_a_quick_roll_that_is_done_passes(
-    checker: FeasibilityChecker, size: float, over: float
-) -> None:
+    [("y", 0.016, 0.28, 0.005), ("y", 0.022, 0.35, 0.005)]
     # Refused for the trunk's turning alone (continuity), though it slips 1.4 mm.
-    report = checker.check(to_and_fro("roll", size, over))
+    + [("roll", 0.25, 0.2, math.inf), ("roll", 0.286, 0.247, math.inf)],
+)
+def test_a_sway_or_a_roll_that_hardly_slips_passes(
+    checker: FeasibilityChecker, channel: str, size: float, over: float, slips: float
+) -> None:
+    report = checker.check(to_and_fro(channel, size, over))
     assert report.ok, report.table()
+    assert report.margins["slip"].value < slips
 
 
 def test_feet_creep_by_what_contacts_leave_out(checker: FeasibilityChecker) -> None:
