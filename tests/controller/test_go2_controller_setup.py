@@ -155,14 +155,12 @@ def pitching(*tasks: Task) -> float:
         return float(np.sqrt(np.mean(run.v[run.time > run.time[-1] - 2.0, 4] ** 2)))
 
 
-def test_a_task_of_ones_own_is_followed_while_the_robot_walks() -> None:
+def test_a_task_of_ones_own_is_followed_on_the_way_and_in_plans_with_few_feet(
+    plant: WatchedPlant,
+) -> None:
     task = SteadyTrunk()
     assert pitching(task) < 0.6 * pitching()
     assert len(task.asked) > 1500
-
-
-def test_a_task_of_ones_own_is_asked_in_plans_with_few_feet_too(plant: WatchedPlant) -> None:
-    task = SteadyTrunk()
     pilot = build_pilot(plant, Config(), extra_tasks=(task,))
     try:
         loop = pilot.runner.loop

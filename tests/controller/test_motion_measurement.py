@@ -136,7 +136,7 @@ def test_a_trunk_beside_its_place_or_turned_is_seen(
     assert found == pytest.approx([SHIFT, 0.1, 0.0, 0.0], abs=1e-6)
 
 
-def test_a_foot_in_the_air_counts_as_paw_and_one_that_has_come_down_as_landed(
+def test_a_foot_counts_as_a_paw_in_the_air_and_as_landed_once_it_has_settled(
     raised: CompiledPlan, model: RobotModel
 ) -> None:
     truth, down = followed(raised), touchdown(raised)
@@ -148,12 +148,6 @@ def test_a_foot_in_the_air_counts_as_paw_and_one_that_has_come_down_as_landed(
     assert found == pytest.approx([0.0, 0.0, SHIFT, 0.0], abs=1e-6)
     found = off_written(replace(truth, p_world_feet=landed), raised, model)
     assert found == pytest.approx([0.0, 0.0, 0.0, SHIFT], abs=1e-6)
-
-
-def test_a_foot_that_settles_in_time_has_landed_well(
-    raised: CompiledPlan, model: RobotModel
-) -> None:
-    truth, down = followed(raised), touchdown(raised)
     late = truth.p_world_feet.copy()
     late[down : down + round(0.5 * LANDED / PERIOD), Leg.FR, 2] += SHIFT
     found = off_written(replace(truth, p_world_feet=late), raised, model)

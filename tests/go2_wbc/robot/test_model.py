@@ -44,7 +44,7 @@ def test_mass_torques_and_speeds_are_the_robots() -> None:
     np.testing.assert_allclose(MODEL.speed_limits, MODEL.description.speeds)
 
 
-def test_the_limits_are_the_tighter_of_urdf_and_published_ones() -> None:
+def test_the_limits_are_the_tighter_of_published_ones_and_those_of_any_urdf(tmp_path: Path) -> None:
     robot = pin.buildModelFromUrdf(str(find_description().urdf_path), pin.JointModelFreeFlyer())
     lower, upper = robot.lowerPositionLimit[7:], robot.upperPositionLimit[7:]
     hips, others = np.arange(12) % 3 == 0, np.arange(12) % 3 != 0
@@ -53,9 +53,6 @@ def test_the_limits_are_the_tighter_of_urdf_and_published_ones() -> None:
     np.testing.assert_array_equal(MODEL.q_upper[hips], HIP_LIMIT)
     np.testing.assert_array_equal(MODEL.q_lower[others], lower[others])
     np.testing.assert_array_equal(MODEL.q_upper[others], upper[others])
-
-
-def test_a_urdf_with_tighter_hips_keeps_them(tmp_path: Path) -> None:
     narrow = described(tmp_path, installed_urdf().replace("1.0472", "0.5"))
     np.testing.assert_array_equal(narrow.q_upper[0::3], 0.5)
     np.testing.assert_array_equal(narrow.q_lower[0::3], -0.5)

@@ -121,7 +121,7 @@ def test_the_attitudes_error_is_the_logarithm_up_to_a_turn_by_pi(seed: int, angl
     np.testing.assert_allclose(error, turn, atol=LOGARITHM)
 
 
-def test_a_payload_falls_with_the_robot() -> None:
+def test_a_payload_falls_with_the_robot_and_is_borne_evenly_by_its_feet() -> None:
     """The CoM's acceleration is that of all mass, under all weight."""
     bare, reference, z = scene(3)
     snapshot = MODEL.snapshot(bare.state, Payload(4.0, (0.05, 0.08, 0.1)))
@@ -136,11 +136,6 @@ def test_a_payload_falls_with_the_robot() -> None:
     )
     task = BodyPosition(GAINS, MODEL.mass * MODEL.gravity)
     np.testing.assert_allclose(residual(task, snapshot, reference, z), a_com - wanted, atol=1e-9)
-
-
-def test_feet_are_asked_to_bear_a_payload_evenly() -> None:
-    bare, reference, z = scene(3)
-    snapshot = MODEL.snapshot(bare.state, Payload(4.0, (0.05, 0.08, 0.1)))
     reference = replace(reference, legs=(ST, SW, ST, ST))
     found = residual(ForceRegularisation(160.0), snapshot, reference, z).reshape(3, 3)
     share = (160.0 + 4.0 * MODEL.gravity) / 3.0

@@ -39,19 +39,13 @@ def sway(plans: dict[str, DynamicTrajectory], model: RobotModel) -> DynamicTraje
     return nearest(written(SWAY, model), model, tolerance=WIDE)
 
 
-def test_a_sway_too_fast_for_friction_becomes_one_that_is_not(
+def test_a_sway_too_fast_for_friction_is_bent_by_what_a_look_at_its_path_tells(
     sway: DynamicTrajectory, model: RobotModel
 ) -> None:
     asked = written(SWAY, model)
     needed = np.gradient(np.gradient(asked.q[:, 1], asked.times), asked.times)
     assert np.abs(needed).max() > model.gravity  # four times what a cone of 0.5 and 0.5 g allow
     assert all(reading.is_kept for reading in audit(sway, model))
-
-
-def test_the_deviation_is_what_a_look_at_the_path_says(
-    sway: DynamicTrajectory, model: RobotModel
-) -> None:
-    asked = written(SWAY, model)
     wanted = np.array([np.interp(sway.times, asked.times, column) for column in asked.q.T]).T
     off = np.linalg.norm(sway.q[:, :3] - wanted[:, :3], axis=1)
     assert sway.position_deviation == pytest.approx(off.max(), abs=1e-3)

@@ -278,7 +278,7 @@ def test_the_feet_of_a_resting_robot_carry_its_weight_with_the_torques_of_static
     assert path.p_com[0, 2] == pytest.approx(STAND_HEIGHT, abs=EXACT)
 
 
-def test_the_trajectory_puts_the_com_and_the_feet_where_the_plan_wants_them(
+def test_a_trajectory_is_where_the_plan_wants_it_and_obeys_the_equations_of_motion(
     good: CompiledPlan, model: RobotModel
 ) -> None:
     path = trajectory_of(good, model)
@@ -290,10 +290,6 @@ def test_the_trajectory_puts_the_com_and_the_feet_where_the_plan_wants_them(
         assert feet[stands] == pytest.approx(path.p_feet[0, stands], abs=EXACT)
         raised = ~np.repeat(stands, 3)
         assert path.q[row, 7:][raised] == pytest.approx(reference.q_joints[raised], abs=EXACT)
-
-
-def test_equations_of_motion_hold_along_a_trajectory(good: CompiledPlan, model: RobotModel) -> None:
-    path = trajectory_of(good, model)
     forces, last = forces_of(path, model), len(path.times) - 1
     for row in range(0, len(path.times), 40):
         near = [min(max(k, 0), last) for k in (row - 1, row, row + 1)]
@@ -334,7 +330,7 @@ def test_it_has_the_report_that_check_gives(
     assert high_five.report.as_dict() == checker.check("high_five").as_dict()
 
 
-def test_at_rest_the_forces_point_up_and_carry_the_weight(
+def test_at_rest_forces_carry_the_weight_and_the_com_keeps_its_margin_over_the_feet(
     checker: FeasibilityChecker, high_five: CheckedMotion
 ) -> None:
     run = high_five.recording()
@@ -346,12 +342,6 @@ def test_at_rest_the_forces_point_up_and_carry_the_weight(
     np.testing.assert_allclose(run.foot_forces[~run.stance], 0.0, atol=_UNLOADED)
     assert not run.stance[held, Leg.FR]
     assert run.stance[held].sum() == 3
-
-
-def test_the_margin_is_that_of_the_com_over_the_standing_feet(
-    checker: FeasibilityChecker, high_five: CheckedMotion
-) -> None:
-    run = high_five.recording()
     for row in (0, len(run.time) // 2, -1):
         com, feet = checker.model.forward_kinematics(run.q[row])
         expected = support_margin(feet[run.stance[row], :2], com[:2])

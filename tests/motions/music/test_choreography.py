@@ -63,12 +63,16 @@ def test_a_foot_comes_down_with_speed_and_the_trunk_turns_back_without_a_rest() 
     assert {key.ease for key in dance.timeline.in_order(BodyKey)} >= {Ease.CUBIC}
 
 
-def test_a_seed_is_a_dance_and_no_move_follows_itself() -> None:
+def test_a_seed_is_a_dance_without_the_same_move_twice_and_unknown_ones_are_refused() -> None:
     names = [[item.move.name for item in compose(steady(120.0), seed).moves] for seed in (1, 1, 2)]
     assert names[0] == names[1] != names[2]
     for seed in range(20):
         moves = compose(steady(97.0), seed).moves
         assert all(first.move is not second.move for first, second in pairwise(moves))
+    with pytest.raises(CommandError, match=r"unknown move 'moonwalk'; valid: bob, bow"):
+        compose(steady(100.0), 0, ["moonwalk"])
+    with pytest.raises(CommandError, match="too short for a dance"):
+        compose(steady(100.0, 2.2), 0)
 
 
 def test_a_fast_song_is_danced_on_its_strong_beats_and_a_waltz_in_threes() -> None:
@@ -140,13 +144,6 @@ def test_a_move_that_is_refused_is_replaced_by_another(monkeypatch: pytest.Monke
 
 def test_a_long_song_is_danced_for_three_minutes() -> None:
     assert 175.0 < compose(steady(90.0, 400.0), 0).timeline.end < 182.0
-
-
-def test_an_unknown_move_and_a_short_song_are_refused() -> None:
-    with pytest.raises(CommandError, match=r"unknown move 'moonwalk'; valid: bob, bow"):
-        compose(steady(100.0), 0, ["moonwalk"])
-    with pytest.raises(CommandError, match="too short for a dance"):
-        compose(steady(100.0, 2.2), 0)
 
 
 PERIOD = 0.002
