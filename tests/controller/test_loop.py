@@ -1,7 +1,6 @@
 """The loop damps a robot whose QP, plant or posture fails, and says why."""
 
 import logging
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +18,7 @@ from go2_wbc.reference import JointReference, Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.safety import SafetyConfig
-from go2_wbc.robot.state import RobotState, Snapshot
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
 from go2_wbc.wbc.relaxation import LIMITS
@@ -31,8 +30,6 @@ SAFETY = SafetyConfig()
 # Ticks that a silent plant is borne with.
 BORNE = int(SAFETY.stale_limit / PERIOD)
 STANDING = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0, *np.tile([0.0, 0.8, -1.6], 4)])
-
-Corrupt = Callable[[RobotState], RobotState]
 
 
 class Balance(Behaviour):
