@@ -31,6 +31,7 @@ def test_a_jump_lands_at_the_place_and_heading_asked_for() -> None:
 
 def test_flights_last_whole_knots_as_long_as_is_asked_and_hops_a_period() -> None:
     times, landed, before = [], 0.0, ALL_FEET
+    assert phase_builders.hop(times=10)
     for phase in phase_builders.hop(times=4, period=0.47):
         if phase.stance and not before:
             times.append(landed)
@@ -66,6 +67,7 @@ def test_rearing_holds_the_front_feet_up_and_a_lift_the_others_down() -> None:
         lambda: phase_builders.jump(flight=0.0),
         lambda: phase_builders.jump(flight=3.0),
         lambda: phase_builders.hop(times=0),
+        lambda: phase_builders.hop(times=11),
         lambda: phase_builders.hop(period=0.1),
         lambda: phase_builders.rear(pitch=0.4),
         lambda: phase_builders.rear(hold=5.0),
@@ -76,3 +78,11 @@ def test_rearing_holds_the_front_feet_up_and_a_lift_the_others_down() -> None:
 def test_what_no_go2_can_do_is_refused(ask: Callable[[], tuple[Phase, ...]]) -> None:
     with pytest.raises(TimelineError, match=r"must be|lift one or two"):
         ask()
+
+
+@pytest.mark.parametrize(
+    ("pitch", "meant"), [(0.4, "-0.4"), (30.0, r"-deg\(30\)"), (-30.0, r"deg\(-30\)")]
+)
+def test_an_angle_of_the_other_sign_or_in_degrees_is_told(pitch: float, meant: str) -> None:
+    with pytest.raises(TimelineError, match=rf"did you mean {meant}\?"):
+        phase_builders.rear(pitch=pitch)

@@ -309,6 +309,9 @@ def test_a_table_fits_80_columns_and_names_every_check(
     lines = report.table().splitlines()
     assert max(map(len, lines)) <= 80
     assert all(any(line.startswith(check) for line in lines) for check in report.margins)
+    for series in report.series:
+        if (finding := report.margins.get(series.check)) is not None:
+            assert np.nanmin(series.least_margins()) == pytest.approx(finding.margin)
     assert "can do it" in lines[-2]
     assert lines[-1].startswith("Chance that it is done so: ")
 

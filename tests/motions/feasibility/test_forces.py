@@ -397,7 +397,9 @@ def test_a_joint_at_its_stop_is_refused_by_what_it_moves(checker: FeasibilityChe
     def nose_up(angle: float, z: float) -> Timeline:
         return Timeline().body(pitch=-deg(angle), z=z, over=1.0).hold(0.3).home(over=1.0)
 
-    little = checker.check(nose_up(22.0, 0.04)).margins["joint position"]
+    report = checker.check(nose_up(22.0, 0.04))
+    little = report.margins["joint position"]
+    assert little not in report.failures
     assert little.value > little.limit
     assert little.margin == 0.0
     assert checker.check(nose_up(28.0, 0.04)).margins["joint position"].margin < 0.0

@@ -11,7 +11,7 @@ from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.rotations import yaw_rotation
 from motions import FeasibilityChecker, Timeline, deg, load_motion
 from motions.language.footing import Footing
-from motions.language.keys import JointKey, PhaseKey
+from motions.language.keys import BodyKey, JointKey, PhaseKey
 from motions.plan.trajectory import trajectory_of
 from motions.postures import standing_feet
 from tests.motions.plans import MODEL, curves_at, plan_of
@@ -120,6 +120,9 @@ def test_a_trunk_that_is_shifted_in_height_keeps_its_own_moves_of_height() -> No
     path = Timeline().body_path([{"z": low}, {"z": middle}], over=1.0).home(over=1.0)
     moved = Timeline().body_path([{"z": middle}, {"z": high}], over=1.0).home(over=1.0)
     assert written(path.shift_height(low)) == written(moved)
+    both = Timeline().body(yaw=0.1, over=0.5).also().body(pitch=0.1, over=1.0).home(over=1.0)
+    heights = [key for key in both.shift_height(low).in_order(BodyKey) if key.channel == "z"]
+    assert [(key.start, key.end) for key in heights] == [(0.0, 1.0), (1.0, 2.0)]
 
 
 def test_longer_shifts_delay_what_follows_and_stretch_what_goes_on_meanwhile() -> None:
