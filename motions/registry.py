@@ -45,7 +45,9 @@ def find_motion(name: str) -> Motion:
         CommandError: for an unknown name; lists the valid ones.
     """
     if name not in _homes():
-        raise CommandError(unknown_name("motion", name, _homes()))
+        stem = Path(name).stem
+        own = f"; of your own file: from {stem} import NAME" if name.endswith(".py") else ""
+        raise CommandError(unknown_name("motion", name, _homes()) + own)
     module = importlib.import_module(f"motions.library.{_homes()[name]}")
     return getattr(module, name)
 

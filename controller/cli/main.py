@@ -198,17 +198,22 @@ def build_parser(
     )
     version = installed_version(PROGRAM) or "(not installed)"
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {version}")
-    parser.add_argument(
-        "-v", "--verbose", action="store_true", help="log what happens (to standard error)"
-    )
+    _add_verbose(parser)
     parser.set_defaults(run=None)
     subparsers = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND")
     for command in program.commands:
         if is_whole or command.name == requested:
             command.add_to(subparsers)
+            _add_verbose(subparsers.choices[command.name], argparse.SUPPRESS)
         else:
             subparsers.add_parser(command.name, help=command.summary)
     return parser
+
+
+def _add_verbose(parser: argparse.ArgumentParser, default: bool | str = False) -> None:
+    """Before and behind the command; what stands before it is kept where nothing stands behind."""
+    told = "log what happens (to standard error)"
+    parser.add_argument("-v", "--verbose", action="store_true", default=default, help=told)
 
 
 def _explained(error: BaseException) -> tuple[str, ExitCode]:

@@ -76,7 +76,7 @@ class EstimatorConfig:
     place: float = 0.002
     velocity: float = 0.05
     velocity_share: float = 0.05
-    height: float = 0.02
+    height: float = 0.005
     uneven: float = 0.03
     uneven_time: float = 2.0
     contact_force: float = 10.0
@@ -100,10 +100,10 @@ class EstimatorConfig:
     still_drift: float = 0.0005
     touchdown_slip: float = 1.5
     touchdown_time: float = 0.009
-    vertical: float = 0.5
+    vertical: float = 0.1
     vertical_share: float = 0.1
-    landing: float = 20.0
-    landing_time: float = 0.05
+    landing: float = 1000.0
+    landing_time: float = 0.01
     compliance: float = 5e-5
     longest_step: float = 0.1
 

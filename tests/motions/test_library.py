@@ -44,6 +44,11 @@ def test_an_unknown_name_is_refused_with_the_valid_ones(name: str) -> None:
     assert all(valid in str(caught.value) for valid in motion_names())
 
 
+def test_a_file_of_ones_own_is_to_be_imported() -> None:
+    with pytest.raises(CommandError, match="from greet import NAME"):
+        find_motion("moves/greet.py")
+
+
 @pytest.mark.parametrize("name", motion_names())
 def test_every_motion_of_the_library_is_feasible_on_both_sides(
     checker: FeasibilityChecker, name: str

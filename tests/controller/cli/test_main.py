@@ -192,7 +192,24 @@ def test_what_is_wrong_is_said_with_what_is_valid_and_leaves_nothing(
 def test_the_exit_code_of_a_command_is_passed_on(act: Callable[[Action], None], run: Run) -> None:
     act(one)
     run("act", code=1)
-    run("--verbose", "act", code=1)
+
+
+@pytest.mark.parametrize(
+    ("words", "level"),
+    [("act", "WARNING"), ("-v act", "INFO"), ("act -v", "INFO"), ("-v act --verbose", "INFO")],
+)
+def test_it_logs_what_happens_where_it_is_asked_to_before_or_behind_the_command(
+    words: str,
+    level: str,
+    act: Callable[[Action], None],
+    run: Run,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    levels: list[int] = []
+    monkeypatch.setattr(logging, "basicConfig", lambda **how: levels.append(how["level"]))
+    act(one)
+    run(*words.split(), code=1)
+    assert levels == [logging.getLevelNamesMapping()[level]]
 
 
 @pytest.mark.parametrize(
