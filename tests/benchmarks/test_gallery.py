@@ -47,16 +47,13 @@ def test_a_loop_shows_all_of_a_run_and_a_long_one_faster(length: float, pictures
         assert getattr(image, "n_frames", 1) == pictures
 
 
-def test_a_run_becomes_a_looping_film_that_starts_just_before_the_first_step() -> None:
+def test_the_film_starts_just_before_the_first_step_moves_loops_and_is_small() -> None:
     run = gallery.from_first_step(synthetic_recording(script=(("stand", 1.5), ("walk", 1.4))))
     assert run.labels[0] == "stand"
     assert run.spans()[1].start == pytest.approx(gallery.LEAD, abs=0.02)
     with Image.open(io.BytesIO(gallery.film_of(run))) as image:
         assert image.info["loop"] == 0
         assert getattr(image, "n_frames", 1) == 1 + round(20.0 / gallery.FILM_SPEED)
-
-
-def test_the_film_of_the_readme_is_small_and_has_moving_pictures() -> None:
     assert DEMO.stat().st_size <= gallery.FILM_SIZE_LIMIT
     with Image.open(DEMO) as image:
         assert image.size == gallery.FILM_STYLE.size

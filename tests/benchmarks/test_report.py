@@ -96,13 +96,10 @@ def test_every_real_metric_fits_the_table_and_has_its_own_name(name: str) -> Non
         assert max(map(len, text.splitlines())) <= WIDTH
 
 
-def test_the_deviation_is_that_of_a_sample() -> None:
+def test_the_deviation_is_that_of_a_sample_and_the_json_has_every_key_and_no_nan() -> None:
     result = summarise_metric(SPEED, measured(3.0, 0.5, 1.0))
     assert result.sd == pytest.approx(math.sqrt((1.5**2 + 1.0**2 + 0.5**2) / 2))
     assert summarise_metric(SPEED, measured(3.0)).sd is None
-
-
-def test_the_json_has_every_key_and_no_nan() -> None:
     results = {"fake": {0: fake().run(0), 1: TrialResult({"fake.speed": math.inf})}}
     value = summarise([fake()], results).as_dict()
     text = json.dumps(value, allow_nan=False)

@@ -119,15 +119,10 @@ def touchdown(plan: CompiledPlan) -> int:
     return in_air[-1] + 1
 
 
-def test_a_robot_that_does_what_is_written_is_nowhere_off(
+def test_what_is_done_as_written_is_nowhere_off_and_a_trunk_beside_its_place_is_seen(
     raised: CompiledPlan, model: RobotModel
 ) -> None:
     assert off_written(followed(raised), raised, model).max() < 1e-6
-
-
-def test_a_trunk_beside_its_place_or_turned_is_seen(
-    raised: CompiledPlan, model: RobotModel
-) -> None:
     truth = followed(raised)
     p, rpy = truth.p_world_com.copy(), truth.rpy.copy()
     p[300:310, 1] += SHIFT

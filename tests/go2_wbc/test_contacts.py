@@ -129,7 +129,7 @@ def lift_of_fr() -> ContactSchedule:
     return ContactSchedule((0.0, 1.0, 3.0), modes)
 
 
-def test_a_schedule_without_period_holds_its_first_and_last_mode(
+def test_without_period_the_first_and_last_mode_are_held_without_end(
     lift_of_fr: ContactSchedule,
 ) -> None:
     for t, up in ((-5.0, False), (0.0, False), (0.999, False), (1.0, True), (2.999, True)):
@@ -137,11 +137,6 @@ def test_a_schedule_without_period_holds_its_first_and_last_mode(
     for t in (3.0, 100.0):
         assert lift_of_fr.at(t).stance.all()
     assert all(lift_of_fr.at(t).stance[[0, 2, 3]].all() for t in (0.0, 2.0, 4.0))
-
-
-def test_without_period_the_time_before_the_first_and_after_the_last_change_is_endless(
-    lift_of_fr: ContactSchedule,
-) -> None:
     before, during, after = (lift_of_fr.at(t) for t in (0.25, 1.5, 4.0))
     assert (before.elapsed[1], before.remaining[1]) == (np.inf, 0.75)
     assert (during.elapsed[1], during.remaining[1]) == (0.5, 1.5)

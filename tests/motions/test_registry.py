@@ -22,7 +22,7 @@ def written(folder: Path, text: str, name: str = "mine.py") -> Path:
     return file
 
 
-def test_the_motions_of_a_file_come_by_name_without_those_it_imports(tmp_path: Path) -> None:
+def test_the_motions_of_a_file_come_by_name_also_after_it_was_changed(tmp_path: Path) -> None:
     found = load_file(written(tmp_path, HEAD + NOD + NOD.replace("nod", "shake")))
     assert list(found) == ["nod", "shake"]
     assert found["nod"].source.endswith("mine.py:4")
@@ -34,6 +34,10 @@ def test_the_motions_of_a_file_come_by_name_without_those_it_imports(tmp_path: P
         + "\n\nagain = nod\nother = bow\n"
     )
     assert list(load_file(written(tmp_path, text))) == ["nod"]
+    file = written(tmp_path, HEAD + NOD)
+    assert load_file(file)["nod"]().end == 1.0
+    written(tmp_path, HEAD + NOD.replace("over=1.0", "over=2.5"))
+    assert load_file(file)["nod"]().end == 2.5
 
 
 def test_two_motions_of_one_name_and_what_is_no_file_are_refused(tmp_path: Path) -> None:
@@ -61,13 +65,6 @@ def test_a_file_that_does_not_load_is_named_with_the_line(
 ) -> None:
     with pytest.raises(TimelineError, match=message):
         load_file(written(tmp_path, text))
-
-
-def test_a_file_may_be_loaded_again_after_it_was_changed(tmp_path: Path) -> None:
-    file = written(tmp_path, HEAD + NOD)
-    assert load_file(file)["nod"]().end == 1.0
-    written(tmp_path, HEAD + NOD.replace("over=1.0", "over=2.5"))
-    assert load_file(file)["nod"]().end == 2.5
 
 
 def test_a_file_that_is_saved_twice_in_a_second_is_read_anew(

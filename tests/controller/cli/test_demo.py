@@ -161,9 +161,16 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     return seen
 
 
-def test_options_reach_plant_controller_and_engine(
+def test_options_reach_plant_controller_and_engine_and_without_any_it_starts_exactly(
     tmp_path: Path, seen: dict[str, Any], run: Run
 ) -> None:
+    run("demo", "--no-media", "--out", tmp_path)
+    assert seen["initial_joint_noise"] == 0.0
+    assert (seen["terrain"], seen["lidar"], seen["sensors"]) == (None, False, "ideal")
+    assert (seen["realtime"], seen["viewer"]) == (False, False)
+    run("demo", "--no-media", "--out", tmp_path, "--terrain", "stairs", code=ExitCode.FAILED)
+    assert isinstance(seen["terrain"], Stairs)
+    assert (seen["lidar"], seen["sensors"]) == (True, "imu")
     file = tmp_path / "mine.toml"
     file.write_text("[locomotion]\nheight = 0.27\n", encoding="utf-8")
     options = "--seed 3 --friction 0.4 --mass-scale 1.2 --realtime --backend full --solver proxqp"
@@ -174,23 +181,6 @@ def test_options_reach_plant_controller_and_engine(
     assert (seen["realtime"], seen["viewer"], seen["mjcf"]) == (True, False, None)
     assert isinstance(config, Config)
     assert (config.backend, config.wbc.solver, config.locomotion.height) == ("full", "proxqp", 0.27)
-
-
-def test_over_a_terrain_it_has_its_own_sensors_and_a_lidar(
-    tmp_path: Path, seen: dict[str, Any], run: Run
-) -> None:
-    run("demo", "--no-media", "--out", tmp_path, "--terrain", "stairs", code=ExitCode.FAILED)
-    assert isinstance(seen["terrain"], Stairs)
-    assert (seen["lidar"], seen["sensors"]) == (True, "imu")
-
-
-def test_without_options_the_robot_starts_exactly_headless_and_as_fast_as_the_cpu(
-    tmp_path: Path, seen: dict[str, Any], run: Run
-) -> None:
-    run("demo", "--no-media", "--out", tmp_path)
-    assert seen["initial_joint_noise"] == 0.0
-    assert (seen["terrain"], seen["lidar"], seen["sensors"]) == (None, False, "ideal")
-    assert (seen["realtime"], seen["viewer"]) == (False, False)
 
 
 def test_the_choices_are_those_of_the_engine() -> None:
@@ -324,23 +314,7 @@ def test_a_terminal_without_ticks_gets_words(encoding: str | None) -> None:
 # --- the progress line --------------------------------------------------------------------------
 
 
-def test_on_a_terminal_progress_is_one_line_in_place(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("COLUMNS", "40")
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    with ProgressLine() as line:
-        line.update(0.5, "x" * 100)
-        line.done("one piece")
-    text = capsys.readouterr().err
-    assert "\n" not in text
-    assert "one piece" not in text
-    shown = text.split("\x1b[2K")[1].rstrip("\r")
-    assert len(shown) < 40
-    assert text.endswith("\r\x1b[2K")
-
-
-def test_while_something_is_solved_the_line_says_how_far_that_is(
+def test_on_a_terminal_progress_is_one_line_in_place_that_tells_of_solving(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
@@ -353,6 +327,17 @@ def test_while_something_is_solved_the_line_says_how_far_that_is(
         f"{progress_bar(0.5)} checking sway: solving, iteration {n}, cost 1.23e+03"
         for n in (1, 6, 11)
     ]
+    monkeypatch.setenv("COLUMNS", "40")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    with ProgressLine() as line:
+        line.update(0.5, "x" * 100)
+        line.done("one piece")
+    text = capsys.readouterr().err
+    assert "\n" not in text
+    assert "one piece" not in text
+    shown = text.split("\x1b[2K")[1].rstrip("\r")
+    assert len(shown) < 40
+    assert text.endswith("\r\x1b[2K")
 
 
 def test_of_what_a_search_says_the_first_answer_stays_on_a_terminal(

@@ -48,25 +48,17 @@ def test_robots_of_three_kinds_and_one_value_each_ship_and_others_are_refused(
 
 
 @EVERY
-def test_a_profile_is_one_value_that_can_be_sent_to_another_process(name: str) -> None:
+def test_a_robots_profile_snapshot_and_simulation_are_those_of_its_model(name: str) -> None:
     profile = find_profile(name)
     assert isinstance(profile, RobotProfile)
     assert hash(profile) == hash(find_profile(name))
     assert pickle.loads(pickle.dumps(profile)) == profile
-
-
-@EVERY
-def test_the_snapshot_of_every_robot_is_that_of_pinocchio(name: str) -> None:
     model, rng = model_of(name), np.random.default_rng(7)
     for _ in range(20):
         state = random_state(rng)
         ours, theirs = model.snapshot(state), model.pinocchio_snapshot(state)
         np.testing.assert_allclose(ours.row, theirs.row, atol=ROUNDING)
         assert ours.profile is theirs.profile is model.profile
-
-
-@EVERY
-def test_feet_and_mass_of_the_simulated_robot_are_those_of_the_model(name: str) -> None:
     model, plant = model_of(name), MujocoPlant(robot=name)
     assert plant.robot == name
     assert plant.total_mass == pytest.approx(model.mass, rel=1e-6)

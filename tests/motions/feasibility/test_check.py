@@ -216,13 +216,25 @@ def test_a_foot_that_moves_along_the_ground_is_found_and_one_that_rises_on_its_w
     assert finding.value == pytest.approx(0.05, abs=3e-3)  # and the last bit of the way down
 
 
-def test_legs_that_cross_are_found(checker: FeasibilityChecker) -> None:
+def test_legs_that_cross_or_end_elsewhere_are_found_and_no_balance_has_no_number(
+    checker: FeasibilityChecker,
+) -> None:
     crossing = (
         Timeline().foot("FR", z=0.10, over=0.8).foot("FR", y=0.26, z=0.04, over=0.8).home(over=1.0)
     )
     (finding,) = [f for f in checker.check(crossing).failures if f.check == "self-collision"]
     assert "FL" in finding.subject
     assert "FR" in finding.subject
+    report = checker.check(AWAY["balance"])
+    (finding,) = [f for f in report.failures if f.check == "balance"]
+    assert "nan" not in str(finding)
+    assert "two feet cannot balance the trunk" in str(finding)
+    assert "nan" not in report.table()
+    for line in (
+        Timeline(entry=Posture.LIE).body(z=0.0, roll=0.01, over=1.0),
+        Timeline(exit=Posture.SIT).body(z=-0.05, over=1.0).home(over=1.0),
+    ):
+        assert "entry and exit" in failed(checker.check(line))
 
 
 def test_a_name_of_the_library_may_be_checked_and_nothing_else(checker: FeasibilityChecker) -> None:
@@ -232,24 +244,6 @@ def test_a_name_of_the_library_may_be_checked_and_nothing_else(checker: Feasibil
     for ask in (FeasibilityChecker.check, FeasibilityChecker.evaluate, FeasibilityChecker.plan):
         with pytest.raises(CommandError, match=r"motion must be a name of the library.* got 3"):
             inspect.unwrap(ask)(checker, 3)  # past the checks of types
-
-
-def test_a_moment_without_balance_is_told_without_a_number(checker: FeasibilityChecker) -> None:
-    report = checker.check(AWAY["balance"])
-    (finding,) = [f for f in report.failures if f.check == "balance"]
-    assert "nan" not in str(finding)
-    assert "two feet cannot balance the trunk" in str(finding)
-    assert "nan" not in report.table()
-
-
-def test_a_motion_that_starts_lying_or_ends_elsewhere_is_refused(
-    checker: FeasibilityChecker,
-) -> None:
-    for line in (
-        Timeline(entry=Posture.LIE).body(z=0.0, roll=0.01, over=1.0),
-        Timeline(exit=Posture.SIT).body(z=-0.05, over=1.0).home(over=1.0),
-    ):
-        assert "entry and exit" in failed(checker.check(line))
 
 
 @pytest.mark.parametrize(("exit", "way"), [(Posture.STAND, "home()"), (Posture.SIT, "'sit')")])

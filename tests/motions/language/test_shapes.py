@@ -31,7 +31,7 @@ def written(line: Timeline) -> list[str]:
 # --- shapes -------------------------------------------------------------------------------
 
 
-def test_a_path_passes_its_points_without_a_stop() -> None:
+def test_a_path_passes_its_points_evenly_without_a_stop() -> None:
     points = [{"x": 0.02, "z": -0.02}, {"x": 0.03, "z": 0.0}, {"x": 0.0, "z": 0.0}]
     plan = plan_of(Timeline().body_path(points, over=2.4, times=[0.6, 1.2, 2.4]))
     start = plan.at(0.0).body.p_world
@@ -41,9 +41,6 @@ def test_a_path_passes_its_points_without_a_stop() -> None:
         assert body.p_world[0] - start[0] == pytest.approx(point["x"], abs=0.005)
     assert np.linalg.norm(plan.at(0.6).body.v_world) > 0.01
     assert np.linalg.norm(plan.at(2.4).body.v_world) < NEAR
-
-
-def test_points_without_times_are_evenly_spaced() -> None:
     points = [{"pitch": deg(6)}, {"pitch": deg(-6)}, {"pitch": 0.0}]
     even = Timeline().body_path(points, over=3.0)
     assert even.keys == Timeline().body_path(points, over=3.0, times=[1.0, 2.0, 3.0]).keys

@@ -123,16 +123,13 @@ def test_a_way_ends_where_it_says_on_feet_below_their_hips_and_is_feasible(
     assert plan.at(plan.duration).p_world_feet == pytest.approx(square, abs=EXACT)
 
 
-def test_a_path_without_headings_heads_where_it_goes() -> None:
+def test_paths_head_where_they_go_and_the_next_motion_goes_on_from_there() -> None:
     line = Timeline().path([(0.3, 0.0), (0.5, 0.2), (0.5, 0.5)], gait="trot")
     plan = plan_of(line)
     yaw = plan.end_pose[2]
     rate = trajectory_of(plan, MODEL).q[:, :2]
     way = rate[-60] - rate[-100]
     assert yaw == pytest.approx(np.arctan2(way[1], way[0]), abs=0.3)
-
-
-def test_the_next_motion_goes_on_where_this_one_has_ended() -> None:
     first = Timeline().walk(0.2, 0.1, deg(60), gait="trot")
     line = first.then(first, Timeline().body(z=-0.03, over=0.5).home(over=0.5))
     p, yaw = np.array([0.2, 0.1, 0.0]), deg(60)

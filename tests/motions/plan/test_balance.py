@@ -55,14 +55,11 @@ def sway(asked: Stepping) -> np.ndarray:
     return SwayProblem(asked).solve(asked)
 
 
-def test_a_problem_is_solved_with_another_bias_as_if_it_were_made_with_it() -> None:
+def test_nothing_moves_where_nothing_must_and_a_bias_counts_as_if_made_with_it() -> None:
     asked = stepping({Leg.FL: (1.0, 1.3), Leg.RR: (1.5, 1.9)})
     biased = replace(asked, bias=np.full((len(TIMES), 2), 0.01))
     assert np.array_equal(SwayProblem(asked).solve(biased), sway(biased))
     assert not np.array_equal(sway(asked), sway(biased))
-
-
-def test_nothing_moves_where_nothing_must() -> None:
     assert not sway(stepping({})).any()
 
 
