@@ -95,6 +95,8 @@ def test_an_unknown_back_end_and_a_plant_that_cannot_be_read_are_refused(
 ) -> None:
     with pytest.raises(ConfigError, match="valid: condensed, full, placo"):
         GO2Controller(plant=plant, config=Config(backend="magic"))
+    with pytest.raises(ConfigError, match="of which robot"):
+        GO2Controller(plant=plant, config=Config.of_robot("a1"))
     assert not plant.commands
     plant.close()
     with pytest.raises(ClosedError, match="plant is closed"):

@@ -4,6 +4,7 @@ import json
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from controller import sweep
@@ -41,6 +42,8 @@ def test_a_trial_is_drawn_by_its_seed_inside_its_ranges() -> None:
     ):
         assert low <= min(values) < low + 0.05 * (high - low)
         assert high - 0.05 * (high - low) < max(values) <= high
+    each = np.corrcoef([(t.friction, t.mass_scale, t.initial_yaw) for t in trials], rowvar=False)
+    assert np.abs(each - np.eye(3)).max() < 0.3
     a, b, other = Trial(5), Trial(5), Trial(6)
     assert (a.friction, a.mass_scale, a.initial_yaw) == (b.friction, b.mass_scale, b.initial_yaw)
     assert a.mass_scale != other.mass_scale
