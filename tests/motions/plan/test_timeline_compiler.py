@@ -168,6 +168,7 @@ def spans(path: Trajectory, *broken: float) -> list[tuple[float, float]]:
         ((0.6, 1.6), [(0.5 - LEAD, 1.7 + LEAD)]),  # poses without a hold between them
         ((1.0, 3.0), [(0.2, 2.0), (2.4, 3.95)]),  # the ends bound the last
         ((), []),
+        ((0.5,), [(0.5 - LEAD, 1.7 + LEAD)]),  # as the rest ends
         ((2.2,), [(0.2, 3.95)]),  # a rest that breaks a limit itself is no end
     ],
 )

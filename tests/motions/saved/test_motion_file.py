@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from go2_wbc.curves import Ease
 from go2_wbc.errors import ConfigError, MotionFileError, TimelineError
 from motions import Timeline, check, find_motion, load_motion, motion_names, save_motion
 from motions.language.keys import Key
+from motions.saved import values
 from motions.saved.motion_file import KINDS
 from tests.motions.saved.random_timelines import Written, timeline_of, written
 
@@ -65,7 +67,9 @@ def test_any_timeline_comes_back_as_it_was(tmp_path: Path, drawn: Written) -> No
     assert type(again) is Timeline
 
 
-def test_a_file_has_a_line_for_each_key_and_what_it_leaves_out_its_default(file: Path) -> None:
+def test_a_file_has_a_line_for_each_key_and_what_it_leaves_out_its_default(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     lines = file.read_text().splitlines()
     assert sum('"key": ' in line for line in lines) == len(TIMELINE.keys)
     fields = json.loads(file.read_text())
@@ -77,6 +81,10 @@ def test_a_file_has_a_line_for_each_key_and_what_it_leaves_out_its_default(file:
     assert load_motion(file).name == "motion"
     with pytest.raises(TimelineError, match="has no parameters, got times"):
         load_motion(file, times=3)
+    for least, expected in ((0, nullcontext()), (1, pytest.raises(MotionFileError, match="larg"))):
+        monkeypatch.setattr(values, "LARGEST_FILE", file.stat().st_size - least)
+        with expected:
+            load_motion(file)
 
 
 def test_a_saved_motion_is_played_and_checked_by_the_name_of_its_file(tmp_path: Path) -> None:
