@@ -27,9 +27,9 @@ from benchmarks.qp_infeasibility import commanded
 from benchmarks.robots import PUSH_TIME, UNTOLD, heading_force, plant_of
 from benchmarks.study import Study, TrialResult
 from controller.modes import is_standing
-from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot, set_off
 from go2_wbc.contacts import GAITS
-from go2_wbc.planning.command import VelocityEnvelope
+from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.envelopes import envelope_of
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
@@ -93,9 +93,7 @@ def measure_trotting(trial: Trial, found: TrialResult, push: str) -> None:
 def trots_on(robot: TrialRobot, phase: int, force: np.ndarray) -> bool:
     """Whether a robot that is pushed by ``force`` [N] at a ``phase`` of its trot trots on."""
     period = GAITS["trot"].period
-    robot.require(robot.go2.stand())
-    robot.require(robot.go2.walk())
-    robot.go2.move(TROT_SPEED)
+    set_off(robot, "trot", VelocityCommand(TROT_SPEED))
     try:
         robot.wait(TROT_TIME + phase * period / PHASES)
         robot.push(force, PUSH_TIME)
@@ -223,9 +221,9 @@ STUDIES = (
 
 BENCHMARK = Benchmark(
     "balance",
-    "Pushes, drops, changes of gait, and whether a fall is noticed.",
+    "Pushes, drops, changes of gait, and whether a fall is noticed.\n"
+    "Drops take 10 times the seeds, disturbed runs 50 times.",
     STUDIES,
     examples=("--rows sensors", "--rows recover sensed-recover"),
-    more_seeds="; times 10 for drops, 50 for disturbed runs",
 )
-register, run = BENCHMARK.register, BENCHMARK.run
+run = BENCHMARK.run

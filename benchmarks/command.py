@@ -1,29 +1,69 @@
 """What the commands of the benchmarks share: their options, running studies, what is told."""
 
-import argparse
 import json
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import wraps
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from benchmarks import store
 from benchmarks.report import render, summarise, threshold_text
 from benchmarks.study import IDEAL, IMU, Results, Study, Task, chosen_studies, run_tasks, tasks_of
-from controller.cli.common import ExitCode, ProgressLine, Subparsers, add_parser, print_json
+from controller.cli.common import ExitCode, ProgressLine, output, print_json, reader
 from controller.cli.sweep import tell
 from controller.sweeps.run import SweepResult, sweep
-from go2_wbc.errors import ConfigError
-from go2_wbc.files import checked_output, write_atomically
+from go2_wbc.errors import ConfigError, MissingDependency
+from go2_wbc.files import write_atomically
 
 SEEDS, QUICK_SEEDS = 20, 3
+
+# --- options --------------------------------------------------------------------------------------
+
+positive = reader(int, lambda value: value > 0, "at least 1")
+Sensors = Annotated[
+    str, "true state, or the robot's own sensors; default %(default)s", (IDEAL, IMU)
+]
+Jobs = Annotated[int, "N", "processes, default %(default)s", positive]
+Listed = Annotated[bool, "list the metrics, run nothing"]
+Resume = Annotated[bool, "skip what an interrupted run has finished"]
+RowsFile = Annotated[Path | None, "FILE", f"keep rows here, default in {store.FOLDER}"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Output:
+    """Where results go."""
+
+    json: Annotated[bool, "print JSON instead of the table"] = False
+    out: Annotated[Path | None, "FILE", "also write the JSON here", output(".json")] = None
+
+    def publish(self, values: dict[str, Any], table: str) -> None:
+        """Print the table or the JSON, and write the JSON where it was asked for."""
+        if self.out is not None:
+            write_atomically(self.out, (json.dumps(values, indent=2) + "\n").encode())
+        if self.json:
+            print_json(values)
+        else:
+            print(table)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seeded:
+    """Which studies are run on which seeds, and how."""
+
+    seeds: Annotated[int | None, "N", f"default {SEEDS}", positive] = None
+    quick: Annotated[bool, f"{QUICK_SEEDS} seeds"] = False
+    rows: Annotated[tuple[str, ...], "NAME", "only these scenarios; see --list"] = ()
+    list: Listed = False
+    jobs: Jobs = 2
+    resume: Resume = False
 
 
 @dataclass(frozen=True, slots=True)
 class Benchmark:
-    """A command that runs studies; ``register`` and ``run`` are those of its module.
+    """A command that runs studies; ``run`` is that of its module.
 
     Attributes:
         name: what the command line takes.
@@ -31,9 +71,9 @@ class Benchmark:
         studies: in the order of the report.
         takes: how long it takes, for the help.
         examples: arguments, for the help, besides those that all have.
-        more_seeds: what the help says of the number of seeds, besides the default.
         sensors: whether they can be chosen.
         runs: how often a study that draws nothing is run, one after the other; 0 for seeds.
+        needs: by group, what raises ``MissingDependency`` if it cannot be run.
     """
 
     name: str
@@ -41,13 +81,29 @@ class Benchmark:
     studies: Sequence[Study]
     takes: str = ""
     examples: tuple[str, ...] = ()
-    more_seeds: str = ""
     sensors: bool = False
     runs: int = 0
+    needs: Mapping[str, Callable[[], None]] = field(default_factory=dict)
 
-    def register(self, subparsers: Subparsers) -> None:
-        """Add the command and its options."""
-        judged = "Exit code 0 if every threshold is met, 1 if one is not."
+    @property
+    def run(self) -> Callable[..., int]:
+        """What the command line calls: its parameters are the options, its docstring the help."""
+        call: Callable[..., int] = self._repeated if self.runs else self._on_seeds
+        if self.sensors:
+            call = self._on_sensors
+
+        @wraps(call)
+        def command(**given: Any) -> int:  # noqa: ANN401
+            return call(**given)
+
+        command.__doc__ = self._help
+        return command
+
+    @property
+    def _help(self) -> str:
+        names = dict.fromkeys(n for s in self.studies for n in (s.group, s.name) if n)
+        told = "Exit code 0 if every threshold is met, 1 if one is not."
+        told += f"\n\nNAME: {', '.join(names)}." if self.runs else ""
         lines = [
             f"          {self.takes or 'everything'}",
             *([] if self.runs else [f"--quick   {QUICK_SEEDS} seeds"]),
@@ -55,112 +111,73 @@ class Benchmark:
             *self.examples,
         ]
         examples = "\n".join(f"python -m benchmarks {self.name} {line}" for line in lines)
-        description = f"{self.description}\n{judged}"
-        parser = add_parser(subparsers, self.name, description, examples=examples)
-        if self.runs:
-            names = dict.fromkeys(n for s in self.studies for n in (s.group, s.name) if n)
-            text = f"{', '.join(names)}; default: all"
-            parser.add_argument("names", metavar="NAME", nargs="*", help=text)
-            add_options(parser, "runs", "list", *RESULTS)
-            parser.set_defaults(runs=self.runs, jobs=1)
-        else:
-            sensors = ("sensors",) if self.sensors else ()
-            add_options(parser, *sensors, *SEEDED, more_seeds=self.more_seeds)
+        return f"{self.description}\n{told}\n\nExamples:\n{examples}"
 
-    def run(self, args: argparse.Namespace) -> int:
+    def _on_seeds(self, *, chosen: Seeded, output: Output) -> int:
+        return self._on_sensors(chosen=chosen, output=output)
+
+    def _on_sensors(self, *, sensors: Sensors = IDEAL, chosen: Seeded, output: Output) -> int:
         """Run what was asked for, report; the exit code says whether all thresholds are met."""
-        if self.runs:
-            studies = chosen_studies(self.studies, args.names)
-            return run_and_report(args, studies, tasks_of(studies, args.runs))
-        sensors = getattr(args, "sensors", IDEAL)
         studies = [study for study in self.studies if study.sensors or sensors == IDEAL]
-        studies = [study.on(sensors) for study in chosen_studies(studies, args.rows)]
-        return run_and_report(args, studies, tasks_of(studies, seeds_of(args)))
+        studies = [study.on(sensors) for study in chosen_studies(studies, chosen.rows)]
+        seeds = chosen.seeds or (QUICK_SEEDS if chosen.quick else SEEDS)
+        tasks = [] if chosen.list else tasks_of(studies, seeds)
+        return self._report(studies, tasks, output, jobs=chosen.jobs, resume=chosen.resume)
 
+    def _repeated(
+        self,
+        names: Annotated[tuple[str, ...], "NAME", "some of them, default: all"] = (),
+        *,
+        runs: Annotated[int | None, "N", "how often each is run", positive] = None,
+        list: Listed = False,
+        resume: Resume = False,
+        output: Output,
+    ) -> int:
+        studies = chosen_studies(self.studies, names)
+        if not list:
+            studies = self._possible(studies, is_named=bool(names))
+        tasks = [] if list else tasks_of(studies, runs or self.runs)
+        return self._report(studies, tasks, output, jobs=1, resume=resume)
 
-# --- options --------------------------------------------------------------------------------------
+    def _possible(self, studies: Sequence[Study], *, is_named: bool) -> Sequence[Study]:
+        """Those of ``studies`` that can be run; the others are told of, or raise if they must."""
+        for group in {study.group for study in studies} & self.needs.keys():
+            try:
+                self.needs[group]()
+            except MissingDependency as error:
+                print(f"{group} is not measured: {error}", file=sys.stderr)
+                studies = [study for study in studies if study.group != group]
+                if is_named or not studies:
+                    raise
+        return studies
 
-
-def positive(text: str) -> int:
-    """The type of an option that counts from 1."""
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"must be at least 1, got {value}")
-    return value
-
-
-_COUNT: dict[str, Any] = {"metavar": "N", "type": positive}
-_FLAG: dict[str, Any] = {"action": "store_true"}
-OPTIONS: dict[str, dict[str, Any]] = {
-    "sensors": {
-        "choices": (IDEAL, IMU),
-        "default": IDEAL,
-        "help": "true state, or the robot's own sensors; default %(default)s",
-    },
-    "seeds": {**_COUNT, "help": f"default {SEEDS}"},
-    "quick": {**_FLAG, "help": f"{QUICK_SEEDS} seeds"},
-    "rows": {
-        **{"metavar": "NAME", "nargs": "+", "default": []},
-        "help": "only these scenarios; see --list",
-    },
-    "runs": {**_COUNT, "help": "default %(default)s"},
-    "list": {**_FLAG, "help": "list the metrics, run nothing"},
-    "jobs": {**_COUNT, "default": 2, "help": "processes, default %(default)s"},
-    "resume": {**_FLAG, "help": "skip what an interrupted run has finished"},
-    "json": {**_FLAG, "help": "print JSON instead of the table"},
-    "out": {
-        "metavar": "FILE",
-        "type": lambda name: checked_output(name, [".json"]),  # before the run already
-        "help": "also write the JSON here",
-    },
-}
-"""What several benchmarks take, by name."""
-RESULTS = ("resume", "json", "out")
-SEEDED = ("seeds", "quick", "rows", "list", "jobs", *RESULTS)
-
-
-def add_options(parser: argparse.ArgumentParser, *names: str, more_seeds: str = "") -> None:
-    """Add some of ``OPTIONS``; ``more_seeds`` is said of the number of seeds."""
-    for name in names:
-        option = OPTIONS[name]
-        text = option["help"] + (more_seeds if name == "seeds" else "")
-        parser.add_argument(f"--{name}", **{**option, "help": text})
-
-
-def add_sweep(parser: argparse.ArgumentParser, *, jobs: int) -> None:
-    """Add what benchmarks take that are one sweep; ``jobs`` is the default."""
-    text = f"keep rows here, default in {store.FOLDER}"
-    parser.add_argument("--rows", metavar="FILE", type=Path, help=text)
-    add_options(parser, "jobs", "json", "out")
-    parser.set_defaults(jobs=jobs)
-
-
-def seeds_of(args: argparse.Namespace) -> int:
-    """How many seeds were asked for, by the options ``SEEDED``."""
-    return args.seeds or (QUICK_SEEDS if args.quick else SEEDS)
+    def _report(
+        self,
+        studies: Sequence[Study],
+        tasks: Sequence[Task],
+        output: Output,
+        *,
+        jobs: int,
+        resume: bool,
+    ) -> int:
+        """List the metrics without a task; else run them, print and write the report."""
+        if not tasks:
+            _print_list(studies)
+            return ExitCode.OK
+        report = summarise(studies, measure_all(self.name, tasks, jobs=jobs, resume=resume))
+        output.publish(report.as_dict(), render(report))
+        return ExitCode.OK if report.ok else ExitCode.FAILED
 
 
 # --- runs -----------------------------------------------------------------------------------------
 
 
-def run_and_report(
-    args: argparse.Namespace, studies: Sequence[Study], tasks: Sequence[Task]
-) -> int:
-    """List the metrics or run the tasks; print and write the report; return the exit code."""
-    if args.list:
-        _print_list(studies)
-        return ExitCode.OK
-    report = summarise(studies, measure_all(args, tasks))
-    publish(args, report.as_dict(), render(report))
-    return ExitCode.OK if report.ok else ExitCode.FAILED
-
-
-def measure_all(args: argparse.Namespace, tasks: Sequence[Task]) -> Results:
+def measure_all(name: str, tasks: Sequence[Task], *, jobs: int, resume: bool) -> Results:
     """Run the tasks, tell of every result on standard error, and keep it on disk at once."""
     studies = {study.name: study for study, _ in tasks}
-    results: Results = {name: {} for name in studies}
-    folder = store.FOLDER / args.command
-    with store.opened(folder, studies.values(), resume=args.resume) as kept, ProgressLine() as line:
+    results: Results = {study: {} for study in studies}
+    folder = store.FOLDER / name
+    with store.opened(folder, studies.values(), resume=resume) as kept, ProgressLine() as line:
         if kept.finished:
             print(f"{len(kept.finished)} finished trials are taken from {folder}", file=sys.stderr)
         left = [(s, seed) for s, seed in tasks if (s.name, seed) not in kept.finished]
@@ -168,7 +185,7 @@ def measure_all(args: argparse.Namespace, tasks: Sequence[Task]) -> Results:
             if result := kept.finished.get((study.name, seed)):
                 results[study.name][seed] = result
         line.update(0.0, "starting")
-        for study, seed, result in run_tasks(left, args.jobs):
+        for study, seed, result in run_tasks(left, jobs):
             kept.add(study, seed, result)
             results[study.name][seed] = result
             done = sum(map(len, results.values()))
@@ -180,40 +197,33 @@ def measure_all(args: argparse.Namespace, tasks: Sequence[Task]) -> Results:
 
 
 def run_sweep(
-    args: argparse.Namespace,
+    name: str,
     trial: Callable[[int], object],
     n: int,
     *,
+    rows: Path | None,
+    jobs: int,
     first_seed: int = 0,
 ) -> SweepResult:
     """Run those of ``n`` seeds whose rows are not kept yet, and tell of the progress.
 
-    ``args`` has the options of ``add_sweep``; the rest is as in ``controller.sweep``.
+    Args:
+        name: of the benchmark; the rows are kept in a file of that name, if not in ``rows``.
+        trial, n, first_seed: as in ``controller.sweep``.
+        rows: see ``RowsFile``.
+        jobs: processes.
 
     Raises:
         ConfigError: if the folder of the rows cannot be made, or they depend on something else.
     """
-    rows: Path = args.rows or store.FOLDER / f"{args.command}.sqlite"
+    rows = rows or store.FOLDER / f"{name}.sqlite"
     try:
         rows.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ConfigError(f"cannot make the folder of {rows}: {error.strerror}") from error
     with ProgressLine() as line:
-        options = {"workers": args.jobs, "out": rows, "keep_going": True, "first_seed": first_seed}
+        options = {"workers": jobs, "out": rows, "keep_going": True, "first_seed": first_seed}
         return sweep(trial, n, **options, on_progress=lambda progress: tell(line, progress))
-
-
-# --- output ---------------------------------------------------------------------------------------
-
-
-def publish(args: argparse.Namespace, values: dict[str, Any], table: str) -> None:
-    """Print the table or the JSON, and write the JSON where it was asked for."""
-    if args.out is not None:
-        write_atomically(args.out, (json.dumps(values, indent=2) + "\n").encode())
-    if args.json:
-        print_json(values)
-    else:
-        print(table)
 
 
 def _print_list(studies: Sequence[Study]) -> None:

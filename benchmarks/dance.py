@@ -103,4 +103,4 @@ BENCHMARK = Benchmark(
     takes="minutes on two cores",
     examples=("--rows clicks --json",),
 )
-register, run = BENCHMARK.register, BENCHMARK.run
+run = BENCHMARK.run

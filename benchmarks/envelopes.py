@@ -8,18 +8,18 @@ the planner's default numbers.
 those that ``benchmarks.locomotion`` judges by.
 """
 
-import argparse
 import json
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
-from benchmarks.command import add_sweep, publish, run_sweep
+from benchmarks.command import Jobs, Output, RowsFile, run_sweep
 from benchmarks.robots import UNTOLD, plant_of
-from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.cli.common import ExitCode
 from controller.motion_measurement import FULL
 from controller.sweeps.sweep_file import Row
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
@@ -50,33 +50,29 @@ MOST = {"forward": 4.0, "backward": 3.0, "lateral": 2.0, "turning": 7.0}  # m/s,
 STEPS = 6  # Halvings: a bound is exact to a 64th of ``MOST``
 ITEMS = tuple(product(GAITS, MOST))
 CONFIG = Config(envelope=VelocityEnvelope(forward=1e3, backward=1e3, lateral=1e3, turning=1e3))
-EXAMPLES = """
-python -m benchmarks envelopes           measure and print; ten minutes
-python -m benchmarks envelopes --store   also store them in the package
-"""
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``envelopes``."""
-    parser = add_parser(
-        subparsers,
-        "envelopes",
-        "The greatest speed of each gait, ahead, back, aside and turning, inside the\n"
-        "limits of torque and joint speed and without a fall, by bisection.",
-        examples=EXAMPLES,
-    )
-    parser.add_argument("--store", action="store_true", help="store them in the package")
-    add_sweep(parser, jobs=1)
+def run(
+    *,
+    store: Annotated[bool, "store them in the package"] = False,
+    rows: RowsFile = None,
+    jobs: Jobs = 1,
+    output: Output,
+) -> int:
+    """The greatest speed of each gait, ahead, back, aside and turning.
 
+    Inside the limits of torque and joint speed and without a fall, by bisection.
 
-def run(args: argparse.Namespace) -> int:
-    """Measure what is not kept yet, and store it if asked."""
-    result = run_sweep(args, trial, len(ITEMS))
+    Examples:
+    python -m benchmarks envelopes           measure and print; ten minutes
+    python -m benchmarks envelopes --store   also store them in the package
+    """
+    result = run_sweep("envelopes", trial, len(ITEMS), rows=rows, jobs=jobs)
     bounds = collected(result.rows)
     is_whole = not result.failures and all(len(b) == len(MOST) for b in bounds.values())
-    if args.store and is_whole:
-        store(bounds)
-    publish(args, {"passed": is_whole, "envelopes": bounds}, render(bounds))
+    if store and is_whole:
+        write(bounds)
+    output.publish({"passed": is_whole, "envelopes": bounds}, render(bounds))
     return ExitCode.OK if is_whole else ExitCode.FAILED
 
 
@@ -129,7 +125,7 @@ def collected(rows: Sequence[Row]) -> dict[str, dict[str, float]]:
     return bounds
 
 
-def store(bounds: dict[str, dict[str, float]], file: Path = FILE) -> None:
+def write(bounds: dict[str, dict[str, float]], file: Path = FILE) -> None:
     """Write the bounds where the package looks for them."""
     about = {"measured_by": "python -m benchmarks envelopes --store", "seeds": SEEDS}
     text = json.dumps({"about": about, "gaits": bounds}, indent=1)

@@ -7,21 +7,19 @@ how a value is printed, and what the closest peer reaches. A row has one metric 
 or two: on the true state and on the robot's own sensors.
 """
 
-import argparse
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from benchmarks.figures import SpeedLine, SpeedPanel, speed_figure
-from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.cli.common import ExitCode, plot_file
 from go2_wbc.errors import ConfigError
-from go2_wbc.files import checked_output
-from viz.style import ACCENT, MUTED, PLOT_SUFFIXES, TIGHT, save_figure
+from viz.style import ACCENT, MUTED, TIGHT, save_figure
 
 MARK, END = "<!-- evidence:", "<!-- evidence:end -->"
 """What stands above a table, with its name, and below it."""
@@ -36,14 +34,6 @@ PANELS = (
     ("mae", "mean absolute error, m/s", False),
     ("saturated", "ticks with a motor at all it has, %", False),
 )
-EXAMPLES = """
-python -m benchmarks evidence docs/evidence.md behaviour.json
-python -m benchmarks evidence docs/evidence.md locomotion.json balance.json
-python -m benchmarks evidence docs/explanation/speed.md speed.json
-python -m benchmarks evidence docs/evidence.md behaviour.json more.json
-python -m benchmarks evidence docs/evidence.md locomotion.json balance.json
-                              --plot docs/images/speeds.svg
-"""
 Row = Mapping[str, Any]
 """A row of a benchmark's JSON."""
 
@@ -144,34 +134,33 @@ def _line(row: list[str]) -> Line:
     return Line((truth, sensors), what, shown, peer, bar)
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the arguments of ``evidence``."""
-    parser = add_parser(
-        subparsers,
-        "evidence",
-        "Fill those tables of the page of whose metrics there are some in what the\n"
-        "benchmarks' `--out` wrote; of several files, the last one that has a metric.",
-        examples=EXAMPLES,
-    )
-    parser.add_argument("page", metavar="PAGE", type=Path)
-    parser.add_argument("results", metavar="JSON", type=Path, nargs="+")
-    parser.add_argument(
-        "--plot",
-        metavar="FILE",
-        type=lambda name: checked_output(name, PLOT_SUFFIXES),
-        help="also draw the trot's errors over its speed",
-    )
+def run(
+    page: Annotated[Path, "PAGE", "with tables to fill"],
+    results: Annotated[tuple[Path, ...], "JSON", "what --out of a benchmark wrote"] = (),
+    *,
+    plot: Annotated[
+        Path | None, "FILE", "also draw the trot's errors over its speed", plot_file
+    ] = None,
+) -> int:
+    """Fill the tables of a page from what the benchmarks' `--out` wrote.
 
+    Those of whose metrics there are some; of several files, the last one that has a metric.
 
-def run(args: argparse.Namespace) -> int:
-    """Fill the file from the results, and draw what is asked for."""
+    Examples:
+    python -m benchmarks evidence docs/evidence.md behaviour.json
+    python -m benchmarks evidence docs/evidence.md locomotion.json balance.json
+    python -m benchmarks evidence docs/explanation/speed.md speed.json
+    python -m benchmarks evidence docs/evidence.md behaviour.json more.json
+    python -m benchmarks evidence docs/evidence.md locomotion.json balance.json
+                                  --plot docs/images/speeds.svg
+    """
     rows = {}
-    for file in args.results:
+    for file in results:
         rows |= rows_of(file)
-    text = filled(args.page.read_text(encoding="utf-8"), rows)
-    args.page.write_text(text, encoding="utf-8")
-    if args.plot is not None:
-        save_speeds(rows, args.plot)
+    text = filled(page.read_text(encoding="utf-8"), rows)
+    page.write_text(text, encoding="utf-8")
+    if plot is not None:
+        save_speeds(rows, plot)
     return ExitCode.OK
 
 

@@ -276,4 +276,4 @@ BENCHMARK = Benchmark(
     examples=("--sensors imu --rows parts", "--sensors imu --rows alarms"),
     sensors=True,
 )
-register, run = BENCHMARK.register, BENCHMARK.run
+run = BENCHMARK.run

@@ -6,13 +6,13 @@ says. Families of motions lie in one half each: thresholds of the check may be s
 only, and of the test half no single motion is shown.
 """
 
-import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
+from typing import Annotated
 
-from benchmarks.command import RESULTS, add_options, measure_all, positive, publish
-from benchmarks.study import Study, TrialResult
+from benchmarks.command import Jobs, Output, Resume, Sensors, measure_all, positive
+from benchmarks.study import IDEAL, Results, Study, Task, TrialResult
 from benchmarks.validation_set.drawing import TEST
 from benchmarks.validation_set.physics import (
     BORDER,
@@ -36,7 +36,7 @@ from benchmarks.validation_set.questions import (
     questions,
 )
 from benchmarks.validation_set.scores import HALVES, Case, render, scores, wrong_ones
-from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.cli.common import ExitCode
 from controller.motion_measurement import FELL
 from controller.sweeps.trials import Trial
 from go2_wbc.robot.model import RobotModel
@@ -49,56 +49,53 @@ BORDER_PRECISION, BORDER_RECALL = 0.85, 0.90
 """The same of refusals among the motions at the border."""
 LEAST_DYNAMIC = 100
 """Dynamic motions of the test half that are judged, at least."""
-EXAMPLES = """
-python -m benchmarks feasibility              the exam: 20 minutes, 2 cores
-python -m benchmarks feasibility --motions 60
-python -m benchmarks feasibility --rows dynamic --half test
-python -m benchmarks feasibility --wrong      also what is wrong, train half
-python -m benchmarks feasibility --sensors imu
-                                              on its own sensors
-python -m benchmarks feasibility --borders    bisect missing borders, with
-                                              --remake all: half an hour
-"""
 OUTCOMES = (STRICT, STOPS, LENIENT, FELL)
 _BETWEEN = "; "
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``feasibility``."""
-    parser = add_parser(
-        subparsers,
-        "feasibility",
-        "Does the feasibility check foresee what physics does? Motions over the whole\n"
-        "language, easy, impossible and at the border, are checked and played in MuJoCo.\n"
-        "Exit code 0 if precision and recall meet their thresholds, 1 if not.",
-        examples=EXAMPLES,
-    )
-    parser.add_argument("--rows", choices=QUESTIONS, default=EXAM, help="default %(default)s")
-    parser.add_argument("--half", choices=HALVES, help="only the families of this half")
-    parser.add_argument("--motions", metavar="N", type=positive, help="only the first N")
-    parser.add_argument("--wrong", action="store_true", help="list what is wrong, train half")
-    parser.add_argument("--borders", action="store_true", help="bisect, and store them")
-    parser.add_argument("--remake", action="store_true", help="all borders, stored or not")
-    add_options(parser, "sensors", "jobs", *RESULTS)
+def run(
+    *,
+    rows: Annotated[str, "default %(default)s", (EXAM, DYNAMIC)] = EXAM,
+    half: Annotated[str | None, "only the families of this half", HALVES] = None,
+    motions: Annotated[int | None, "N", "only the first N", positive] = None,
+    wrong: Annotated[bool, "list what is wrong, train half"] = False,
+    borders: Annotated[bool, "bisect, and store them"] = False,
+    remake: Annotated[bool, "all borders, stored or not"] = False,
+    sensors: Sensors = IDEAL,
+    jobs: Jobs = 2,
+    resume: Resume = False,
+    output: Output,
+) -> int:
+    """Does the feasibility check foresee what physics does?
 
+    Motions over the whole language, easy, impossible and at the border, are checked and played in
+    MuJoCo. Exit code 0 if precision and recall meet their thresholds, 1 if not.
 
-def run(args: argparse.Namespace) -> int:
-    """Bisect borders, or hold the exam and report it."""
-    if args.borders:
-        return _bisect(args)
-    if args.remake:
+    Examples:
+    python -m benchmarks feasibility              the exam: 20 minutes, 2 cores
+    python -m benchmarks feasibility --motions 60
+    python -m benchmarks feasibility --rows dynamic --half test
+    python -m benchmarks feasibility --wrong      also what is wrong, train half
+    python -m benchmarks feasibility --sensors imu
+                                                  on its own sensors
+    python -m benchmarks feasibility --borders    bisect missing borders, with
+                                                  --remake all: half an hour
+    """
+    measure = partial(measure_all, "feasibility", jobs=jobs, resume=resume)
+    if borders:
+        return _bisect(measure, motions, output, remake=remake)
+    if remake:
         print("--remake is for --borders: every motion is played, none is stored", file=sys.stderr)
-    asked = QUESTIONS[args.rows]()
-    seeds = [n for n, one in enumerate(asked) if args.half in (None, one.family.half)]
-    seeds = seeds[: args.motions]
-    cases = _measured(args, seeds)
-    judge = judged if args.rows == EXAM else judged_dynamic
+    asked, study = QUESTIONS[rows](), study_of(rows).on(sensors)
+    seeds = [n for n, one in enumerate(asked) if half in (None, one.family.half)][:motions]
+    cases = _cases(asked, measure([(study, seed) for seed in seeds])[study.name])
+    judge = judged if rows == EXAM else judged_dynamic
     is_ok, verdict = judge(cases, len(seeds))
     values = {"passed": is_ok, "scores": {n: s.as_dict() for n, s in scores(cases).items()}}
-    if args.wrong:
-        values["wrong"] = wrong_ones(cases)
-    wrong_lines = wrong_ones(cases) if args.wrong else []
-    publish(args, values, "\n".join([render(cases), *wrong_lines, verdict]))
+    wrong_lines = wrong_ones(cases) if wrong else []
+    if wrong:
+        values["wrong"] = wrong_lines
+    output.publish(values, "\n".join([render(cases), *wrong_lines, verdict]))
     return ExitCode.OK if is_ok else ExitCode.FAILED
 
 
@@ -155,10 +152,8 @@ def study_of(of: str) -> Study:
     )
 
 
-def _measured(args: argparse.Namespace, seeds: Sequence[int]) -> list[Case]:
-    """The cases of these motions."""
-    asked, study = QUESTIONS[args.rows](), study_of(args.rows).on(args.sensors)
-    found = measure_all(args, [(study, seed) for seed in seeds])[study.name]
+def _cases(asked: Sequence[Question], found: Mapping[int, TrialResult]) -> list[Case]:
+    """What was found of these motions; what has no result is told."""
     for seed, one in sorted(found.items()):
         if not one.values:
             print(f"{asked[seed].name}: no result, {one.reason}", file=sys.stderr)
@@ -198,17 +193,23 @@ def judged_dynamic(cases: Sequence[Case], asked: int) -> tuple[bool, str]:
     return is_ok, said + ("ok." if is_ok else "NO.")
 
 
-def _bisect(args: argparse.Namespace) -> int:
+def _bisect(
+    measure: Callable[[Sequence[Task]], Results],
+    motions: int | None,
+    output: Output,
+    *,
+    remake: bool,
+) -> int:
     """Find the borders that are not stored, or all of them, and store them."""
-    kept = {} if args.remake or not BORDERS_FILE.exists() else read_borders()
+    kept = {} if remake or not BORDERS_FILE.exists() else read_borders()
     names = [draw_name(*draw) for draw in draws()]
-    wanted = [seed for seed, name in enumerate(names) if name not in kept][: args.motions]
-    found = measure_all(args, [(BORDERS, seed) for seed in wanted]) if wanted else {}
+    wanted = [seed for seed, name in enumerate(names) if name not in kept][:motions]
+    found = measure([(BORDERS, seed) for seed in wanted]) if wanted else {}
     for seed, one in found.get(BORDERS.name, {}).items():
         if one.values:
             kept[names[seed]] = one.values.get(BORDER)
     write_borders({name: kept[name] for name in names if name in kept})
     none = sum(value is None for value in kept.values())
     text = f"{len(kept)} of {len(names)} borders, {none} beyond the bounds of their family"
-    publish(args, {"borders": len(kept), "draws": len(names), "none": none}, text)
+    output.publish({"borders": len(kept), "draws": len(names), "none": none}, text)
     return ExitCode.OK if len(kept) == len(names) else ExitCode.FAILED

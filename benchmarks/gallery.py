@@ -6,14 +6,14 @@ AVIF takes a quarter of a WebP that moves (Pillow 11.3 or later). With ``--film`
 ``images/sight.avif``, the same over its course by sight.
 """
 
-import argparse
 import io
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from PIL import Image
 
-from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.cli.common import ExitCode
 from controller.demo import DEMO_STEPS, run_demo
 from controller.demo.steps import TERRAINS, terrain_steps
 from controller.go2_controller import GO2Controller
@@ -74,43 +74,30 @@ has seen it ([how](how-to/worlds.md#by-sight)).
 """
 
 
-EXAMPLES = """
-python -m benchmarks gallery docs              the page and all pictures
-python -m benchmarks gallery docs bow wave     the page and these pictures
-python -m benchmarks gallery docs --film         the films of the pages
-"""
+def run(
+    folder: Annotated[Path, "FOLDER", "of the page"],
+    names: Annotated[tuple[str, ...], "MOTION", "default: all"] = (),
+    *,
+    film: Annotated[bool, "write the two films of the demo instead"] = False,
+) -> int:
+    """Play the motions of the library in MuJoCo; write a page with pictures of them.
 
-
-def register(subparsers: Subparsers) -> None:
-    """Add the arguments of ``gallery``."""
-    parser = add_parser(
-        subparsers,
-        "gallery",
-        "Play the motions of the library in MuJoCo; write a page with pictures of them.",
-        examples=EXAMPLES,
-    )
-    parser.add_argument("folder", metavar="FOLDER", type=Path, help="of the page")
-    parser.add_argument("names", metavar="MOTION", nargs="*", help="default: all")
-    parser.add_argument(
-        "--film",
-        action="store_true",
-        help="write the two films of the demo instead",
-    )
-
-
-def run(args: argparse.Namespace) -> int:
-    """Write the film, or the page and the pictures of the motions that were named."""
-    if args.film:
-        _write(args.folder / "images" / "demo.webp", film(from_first_step(demo())))
-        _write(args.folder / "images" / "sight.avif", loop(from_first_step(demo("course"))))
+    Examples:
+    python -m benchmarks gallery docs              the page and all pictures
+    python -m benchmarks gallery docs bow wave     the page and these pictures
+    python -m benchmarks gallery docs --film         the films of the pages
+    """
+    if film:
+        _write(folder / "images" / "demo.webp", film_of(from_first_step(demo())))
+        _write(folder / "images" / "sight.avif", loop(from_first_step(demo("course"))))
         return ExitCode.OK
-    target = checked_output(args.folder / "gallery.md", (".md",))
-    timelines = [find_motion(name)() for name in args.names or motion_names()]
+    target = checked_output(folder / "gallery.md", (".md",))
+    timelines = [find_motion(name)() for name in names or motion_names()]
     with GO2Controller() as robot:
         robot.stand()
         for line in timelines:
             recording = played(line, robot)
-            _write(args.folder / "images" / "gallery" / f"{line.name}.avif", loop(recording))
+            _write(folder / "images" / "gallery" / f"{line.name}.avif", loop(recording))
     write_atomically(target, page().encode())
     return ExitCode.OK
 
@@ -203,7 +190,7 @@ def from_first_step(run: Recording) -> Recording:
     return run.part(slice(int(np.searchsorted(run.time, start)), None))
 
 
-def film(recording: Recording) -> bytes:
+def film_of(recording: Recording) -> bytes:
     """The run as a looping WebP of at most ``FILM_SIZE_LIMIT`` bytes.
 
     Raises:

@@ -7,7 +7,6 @@ told. Records hold for the machine that made them: another processor may round i
 
 from __future__ import annotations
 
-import argparse
 import logging
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
@@ -17,7 +16,7 @@ from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Annotated, Any
 from unittest.mock import patch
 
 import numpy as np
@@ -25,15 +24,9 @@ from jaxtyping import Float, Int, UInt64
 
 from benchmarks.command import positive
 from benchmarks.golden_runs import KEPT_EVERY, RUNS, STAGES, Ledger, Values
-from controller.cli.common import ExitCode, ProgressLine, Subparsers, add_parser
+from controller.cli.common import ExitCode, ProgressLine
 from go2_wbc.errors import CommandError, ConfigError, unknown_name
 
-EXAMPLES = """
-python -m benchmarks golden record out/golden
-python -m benchmarks golden compare out/golden
-python -m benchmarks golden compare out/golden --runs trot-imu boxes
-python -m benchmarks golden compare out/golden --tolerance 1e-9
-"""
 RECORD, COMPARE = "record", "compare"
 
 
@@ -175,48 +168,39 @@ def results(
             yield futures[future], future.result()
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``golden``."""
-    parser = add_parser(
-        subparsers,
-        "golden",
-        "Does the robot do what it did, to the last bit? Record runs before a change and\n"
-        "compare them after it: the first tick and stage that differ are told. Exit code\n"
-        "0 if every run is equal, 1 if one is not. Records hold for this machine alone.",
-        examples=EXAMPLES,
-    )
-    parser.add_argument("act", choices=(RECORD, COMPARE), help="write the runs, or check them")
-    parser.add_argument("folder", metavar="FOLDER", type=Path, help="where the runs are kept")
-    parser.add_argument("--runs", metavar="NAME", nargs="+", help="some of them only")
-    parser.add_argument(
-        "--tolerance", metavar="X", type=float, default=0.0, help="accept numbers as near as this"
-    )
-    parser.add_argument(
-        "--workers", metavar="N", type=positive, default=2, help="processes, default %(default)s"
-    )
+def run(
+    act: Annotated[str, "write the runs, or check them", (RECORD, COMPARE)],
+    folder: Annotated[Path, "FOLDER", "where the runs are kept"],
+    *,
+    runs: Annotated[tuple[str, ...], "NAME", "some of them only"] = (),
+    tolerance: Annotated[float, "X", "accept numbers as near as this"] = 0.0,
+    workers: Annotated[int, "N", "processes, default %(default)s", positive] = 2,
+) -> int:
+    """Does the robot do what it did, to the last bit?
 
+    Record runs before a change and compare them after it: the first tick and stage that differ are
+    told. Exit code 0 if every run is equal, 1 if one is not. Records hold for this machine alone.
 
-def run(args: argparse.Namespace) -> int:
-    """Record or compare; print one line for each run.
-
-    Raises:
-        CommandError: for an unknown run.
-        ConfigError: for a folder without records, or where none can be written.
+    Examples:
+    python -m benchmarks golden record out/golden
+    python -m benchmarks golden compare out/golden
+    python -m benchmarks golden compare out/golden --runs trot-imu boxes
+    python -m benchmarks golden compare out/golden --tolerance 1e-9
     """
-    folder, names = args.folder, args.runs or list(RUNS)
+    names = runs or tuple(RUNS)
     for name in names:
         if name not in RUNS:
             raise CommandError(unknown_name("run", name, RUNS))
-    if args.act == RECORD:
+    if act == RECORD:
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise ConfigError(f"cannot make {folder}: {error.strerror}") from error
-    work = partial(work_on, act=args.act, folder=folder, tolerance=args.tolerance)
-    is_equal, good = True, "recorded" if args.act == RECORD else "equal"
+    work = partial(work_on, act=act, folder=folder, tolerance=tolerance)
+    is_equal, good = True, "recorded" if act == RECORD else "equal"
     with ProgressLine() as line:
-        line.update(0.0, args.act)
-        for number, (name, told) in enumerate(results(work, names, args.workers), 1):
+        line.update(0.0, act)
+        for number, (name, told) in enumerate(results(work, names, workers), 1):
             is_equal &= told is None
             line.update(number / len(names), name)
             print(f"{name:<16}{told or good}", flush=True)

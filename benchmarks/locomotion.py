@@ -303,4 +303,4 @@ BENCHMARK = Benchmark(
     takes="an hour on two cores",
     examples=("--rows sensors", "--rows ahead-2.5 gaits --json"),
 )
-register, run = BENCHMARK.register, BENCHMARK.run
+run = BENCHMARK.run

@@ -4,25 +4,22 @@ While the demo is driven by compiled code, every kernel that is called is given 
 plain Python, tick by tick, and what both made is compared.
 """
 
-import argparse
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from benchmarks.command import Sensors
+from benchmarks.study import IDEAL
 from controller import GO2Controller
-from controller.cli.common import ExitCode, ProgressLine, Subparsers, add_parser
+from controller.cli.common import ExitCode, ProgressLine
 from controller.demo.steps import DemoProgress, StepResult, run_demo
 from go2_wbc.compilation import Kernel, all_kernels, call_plain, load_kernels
 from go2_wbc.plant import MujocoPlant
 
-EXAMPLES = """
-python -m benchmarks plain                      the demo on ideal signals
-python -m benchmarks plain --sensors imu        on the robot's own sensors
-"""
 NEAR = 1e-9
 """Relative and absolute: libraries of sines differ in the last bit, and sums of their values."""
 
@@ -94,26 +91,26 @@ def every_call_compared() -> Iterator[dict[str, Tally]]:
             type(kernel).__call__ = before[name]
 
 
-def register(commands: Subparsers) -> None:
-    """Add ``plain``."""
-    text = "Run the demo, again and again, and hold every compiled call to its own Python."
-    parser = add_parser(commands, "plain", text, examples=EXAMPLES)
-    parser.add_argument("--sensors", choices=("ideal", "imu"), default="ideal", help="of the robot")
-    parser.add_argument("--seconds", type=float, default=60.0, help="of robot time, %(default)g")
-    parser.set_defaults(run=run)
+def run(
+    *, sensors: Sensors = IDEAL, seconds: Annotated[float, "of robot time, %(default)g"] = 60.0
+) -> int:
+    """Run the demo, again and again, and hold every compiled call to its own Python.
 
+    A row for each kernel; exit code 1 if one differs by more than 1e-9.
 
-def run(options: argparse.Namespace) -> int:
-    """Compare, print a row for each kernel; 1 if one differs by more than ``NEAR``."""
+    Examples:
+    python -m benchmarks plain                      the demo on ideal signals
+    python -m benchmarks plain --sensors imu        on the robot's own sensors
+    """
     progress = ProgressLine()
 
     def tell(step: DemoProgress) -> None:
         progress.update(step.index / step.count, step.label)
 
-    plant = MujocoPlant(sensors=options.sensors)
+    plant = MujocoPlant(sensors=sensors)
     steps: list[StepResult] = []
     with every_call_compared() as tallies, GO2Controller(plant=plant) as go2:
-        while go2.state.time < options.seconds:
+        while go2.state.time < seconds:
             steps += run_demo(go2, tell).steps
         print(f"{go2.state.time:.1f} s of the robot's time")
     print(f"{'kernel':<28}{'calls':>9}{'unequal':>9}{'worst':>11}")

@@ -5,27 +5,27 @@ Every motion of the exam is checked and played in random worlds. ``--fit`` fits 
 stores it; what is reported is of the test half, whose families no threshold and no fit has seen.
 """
 
-import argparse
 import csv
 import io
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
-from benchmarks.command import add_sweep, positive, publish, run_sweep
+from benchmarks.command import Jobs, Output, RowsFile, positive, run_sweep
 from benchmarks.figures import reliability_figure
-from benchmarks.probability_fit import Calibration, Sample, calibration, fit
+from benchmarks.probability_fit import Calibration, Sample, calibration, fit_model
 from benchmarks.probability_runs import DRAWN, motion_and_world, seeds, trial
 from benchmarks.validation_set.drawing import TEST, TRAIN
-from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.cli.common import ExitCode, output, plot_file
 from controller.sweeps.summary import rate_interval
 from controller.sweeps.sweep_file import Row
-from go2_wbc.files import checked_output, write_atomically
+from go2_wbc.files import write_atomically
 from motions.feasibility.report import FILE, ProbabilityModel, fitted
-from viz.style import PLOT_SUFFIXES, save_figure
+from viz.style import save_figure
 
 FITTED = (TRAIN, DRAWN)  # What the model may be fitted to
 ERROR, BRIER_SHARE = 0.05, 0.5
@@ -33,59 +33,48 @@ ERROR, BRIER_SHARE = 0.05, 0.5
 COLUMNS = ("seed", "motion", "half", "stratum", "friction", "payload", "refused", "done", "fell")
 """Of a run, besides the chance that was stated."""
 DIGITS = 3
-EXAMPLES = """
-python -m benchmarks probability         two worlds to fit, five to judge,
-                                         3,000 sentences to fit
-python -m benchmarks probability --motions 60
-python -m benchmarks probability --fit   also fit the model, and store it
-python -m benchmarks probability --data docs/data/probability.csv
-                                 --plot docs/images/reliability.svg
-"""
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``probability``."""
-    parser = add_parser(
-        subparsers,
-        "probability",
-        "Is the chance that the check states the one that a motion has? The motions of\n"
-        "the exam are checked and played in random worlds. Exit code 0 if the test half\n"
-        "is calibrated and no motion that passed fell, 1 if not.",
-        examples=EXAMPLES,
-    )
-    parser.add_argument(
-        "--motions", metavar="N", type=positive, help="only the first N, and no sentences"
-    )
-    parser.add_argument(
-        "--fit", action="store_true", help="fit to train half and sentences, and store"
-    )
-    parser.add_argument(
-        "--data", metavar="FILE", type=Path, help="write a .csv with a line for every run"
-    )
-    parser.add_argument("--plot", metavar="FILE", type=Path, help="draw the reliability: .svg, ...")
-    add_sweep(parser, jobs=2)
+def run(
+    *,
+    motions: Annotated[int | None, "N", "only the first N, and no sentences", positive] = None,
+    fit: Annotated[bool, "fit to train half and sentences, and store"] = False,
+    data: Annotated[
+        Path | None, "FILE", "write a .csv with a line for every run", output(".csv")
+    ] = None,
+    plot: Annotated[Path | None, "FILE", "draw the reliability: .svg, ...", plot_file] = None,
+    rows: RowsFile = None,
+    jobs: Jobs = 2,
+    output: Output,
+) -> int:
+    """Is the chance that the check states the one that a motion has?
 
+    The motions of the exam are checked and played in random worlds. Exit code 0 if the test half
+    is calibrated and no motion that passed fell, 1 if not.
 
-def run(args: argparse.Namespace) -> int:
-    """Run what is not kept, fit if asked, and judge the test half."""
-    data = args.data and checked_output(args.data, [".csv"])
-    plot = args.plot and checked_output(args.plot, PLOT_SUFFIXES)
-    result = run_sweep(args, trial, seeds(args.motions))
-    rows, model = result.rows, fitted()
-    if args.fit:
-        model = fit(_samples(_of_halves(rows, *FITTED)))
-        store(model, rows, result.about["code"])
-    judged, falls = judge(model, _of_halves(rows, TEST)), passed_that_fell(rows)
+    Examples:
+    python -m benchmarks probability         two worlds to fit, five to judge,
+                                             3,000 sentences to fit
+    python -m benchmarks probability --motions 60
+    python -m benchmarks probability --fit   also fit the model, and store it
+    python -m benchmarks probability --data docs/data/probability.csv
+                                     --plot docs/images/reliability.svg
+    """
+    result = run_sweep("probability", trial, seeds(motions), rows=rows, jobs=jobs)
+    found, model = result.rows, fitted()
+    if fit:
+        model = fit_model(_samples(_of_halves(found, *FITTED)))
+        store(model, found, result.about["code"])
+    judged, falls = judge(model, _of_halves(found, TEST)), passed_that_fell(found)
     if data:
-        write_atomically(data, csv_of(model, rows))
+        write_atomically(data, csv_of(model, found))
     if plot:
         save_reliability(judged, plot)
     is_ok = is_calibrated(judged) and not falls and not result.failures
-    counts = len(falls), sum(not row["refused"] for row in rows)
+    counts = len(falls), sum(not row["refused"] for row in found)
     about = {"passed_that_fell": counts, "lost": result.failures}
-    publish(
-        args, {"passed": is_ok, **asdict(judged), **about}, render(judged, rows, result.failures)
-    )
+    values = {"passed": is_ok, **asdict(judged), **about}
+    output.publish(values, render(judged, found, result.failures))
     return ExitCode.OK if is_ok else ExitCode.FAILED
 
 

@@ -40,7 +40,7 @@ class Sample(NamedTuple):
     is_done: bool
 
 
-def fit(samples: Sequence[Sample]) -> ProbabilityModel:
+def fit_model(samples: Sequence[Sample]) -> ProbabilityModel:
     """The model of greatest posterior density (MAP), by L-BFGS.
 
     Log likelihood of outcomes y in {0, 1} with P of the model, plus normal priors on each centre,

@@ -176,4 +176,4 @@ BENCHMARK = Benchmark(
     examples=("--rows boxes pushes --json",),
     sensors=True,
 )
-register, run = BENCHMARK.register, BENCHMARK.run
+run = BENCHMARK.run

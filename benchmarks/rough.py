@@ -355,4 +355,4 @@ BENCHMARK = Benchmark(
     takes="an hour on two cores",
     examples=("--rows terrain --quick", "--rows stairs-13 sensed-stairs-13"),
 )
-register, run = BENCHMARK.register, BENCHMARK.run
+run = BENCHMARK.run

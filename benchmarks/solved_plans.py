@@ -4,10 +4,9 @@ To be run whenever a dynamic motion of the library, the planner's limits or the 
 says so. Plans that no motion needs any more are removed.
 """
 
-import argparse
 from collections.abc import Iterator
 
-from controller.cli.common import ExitCode, ProgressLine, Subparsers, add_parser
+from controller.cli.common import ExitCode, ProgressLine
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline, find_motion, motion_names
 from motions.authoring import Choice
@@ -16,23 +15,13 @@ from motions.dynamics.plan_audit import PlanLimits
 from motions.dynamics.plan_cache import SHIPPED, problem_key, ship
 from motions.language.keys import PhaseKey
 
-EXAMPLES = """
-python -m benchmarks solve
-"""
 
+def run() -> int:
+    """Solve the library's dynamic motions anew and keep the plans in the package.
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``solve``."""
-    add_parser(
-        subparsers,
-        "solve",
-        "Solve the library's dynamic motions anew and keep the plans in the package.",
-        examples=EXAMPLES,
-    )
-
-
-def run(args: argparse.Namespace) -> int:
-    """Solve and write, remove what is left over."""
+    Examples:
+    python -m benchmarks solve
+    """
     model = RobotModel()
     problems = shipped_problems(model)
     SHIPPED.mkdir(exist_ok=True)

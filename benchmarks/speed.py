@@ -159,4 +159,4 @@ BENCHMARK = Benchmark(
     examples=("solves ticks --runs 5", "--json --out speed.json"),
     runs=3,
 )
-register, run = BENCHMARK.register, BENCHMARK.run
+run = BENCHMARK.run

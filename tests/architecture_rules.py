@@ -13,36 +13,10 @@ import re
 import tomllib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from pathlib import Path
 
 PACKAGES = ("go2_wbc", "motions", "viz", "controller", "benchmarks")
 """Our packages; ``.importlinter`` says who may import whom."""
-
-FENCES: dict[str, tuple[str, ...]] = {
-    "mujoco": (
-        "go2_wbc/plant/mujoco/*",
-        "benchmarks/model.py",
-    ),
-    "meshcat": ("viz/*",),
-    "matplotlib": ("viz/*", "benchmarks/figures.py", "go2_wbc/recording.py"),  # there only its type
-    "placo": (
-        "go2_wbc/wbc/placo_backend.py",
-        "go2_wbc/robot/inverse_kinematics.py",
-        "benchmarks/speed_placo.py",
-    ),
-    "crocoddyl": ("motions/dynamics/*",),
-    "librosa": ("motions/music/*",),
-    "soundfile": ("motions/music/*",),
-    "rclpy": ("controller/bridges/*",),
-    "cyclonedds": ("controller/bridges/*",),
-    "ray": ("controller/sweeps/ray_engine.py",),
-    "pyarrow": ("controller/sweeps/run.py",),
-    "mcap": ("viz/replay/mcap_file.py",),
-    "rerun": ("viz/replay/rerun_file.py",),
-    "sqlite3": ("controller/sweeps/sweep_file.py",),
-}
-"""The only files that may import each of these libraries."""
 
 DISTRIBUTIONS = {"pinocchio": "pin", "PIL": "pillow", "collada": "pycollada"}
 """What to install for an import name, where the two differ."""
@@ -51,7 +25,7 @@ OPTIONAL = frozenset(
     {"rclpy", "cyclonedds", "crocoddyl", "librosa", "soundfile", "ray", "pyarrow", "pandas"}
     | {"mcap", "rerun"}
 )
-"""Libraries that are imported only by those who have them; their fences keep them apart."""
+"""Libraries that are imported only by those who have them; contracts keep them apart."""
 
 MAX_FILE_LINES = 500
 MAX_BODY_LINES = 70
@@ -62,10 +36,9 @@ _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 
 @dataclass(frozen=True, slots=True)
 class Module:
-    """One source file: its path relative to the root, dotted name, text and syntax tree."""
+    """One source file: its path relative to the root, text and syntax tree."""
 
     path: str
-    name: str
     text: str
     tree: ast.Module
 
@@ -73,56 +46,17 @@ class Module:
 def read_tree(root: Path, packages: Iterable[str] = PACKAGES) -> list[Module]:
     """Every module of ``packages`` under ``root``."""
     files = (file for package in packages for file in sorted((root / package).rglob("*.py")))
-    return [_read(root, file) for file in files]
+    texts = ((file.relative_to(root).as_posix(), file.read_text("utf-8")) for file in files)
+    return [Module(path, text, ast.parse(text, path)) for path, text in texts]
 
 
-def _read(root: Path, file: Path) -> Module:
-    relative = file.relative_to(root)
-    parts = relative.with_suffix("").parts
-    name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-    text = file.read_text(encoding="utf-8")
-    return Module(relative.as_posix(), name, text, ast.parse(text, str(file)))
-
-
-def imports(module: Module, known: frozenset[str]) -> Iterator[tuple[int, str]]:
-    """Line and dotted target of each import; a name taken from a package resolves to its module.
-
-    Args:
-        module: the importing module.
-        known: the dotted names of all our modules.
-    """
+def libraries(module: Module) -> Iterator[tuple[int, str]]:
+    """Line and package of each import that is not relative."""
     for node in ast.walk(module.tree):
         if isinstance(node, ast.Import):
-            yield from ((node.lineno, alias.name) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = _absolute(module, node)
-            for alias in node.names:
-                full = f"{base}.{alias.name}"
-                yield node.lineno, full if full in known else base
-
-
-def _absolute(module: Module, node: ast.ImportFrom) -> str:
-    if not node.level:
-        return node.module or ""
-    parts = module.name.split(".")
-    is_package = module.path.endswith("/__init__.py")
-    kept = parts[: len(parts) - node.level + is_package]
-    return ".".join([*kept, node.module] if node.module else kept)
-
-
-def _names(modules: Iterable[Module]) -> frozenset[str]:
-    return frozenset(module.name for module in modules)
-
-
-def fence_violations(modules: list[Module]) -> list[str]:
-    """Third-party libraries imported outside the files that own them."""
-    known = _names(modules)
-    return [
-        f"{module.path}:{line}: {top} belongs in {', '.join(FENCES[top])}"
-        for module in modules
-        for line, target in imports(module, known)
-        if (top := target.split(".")[0]) in FENCES and not _matches(module.path, FENCES[top])
-    ]
+            yield from ((node.lineno, alias.name.split(".")[0]) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            yield node.lineno, (node.module or "").split(".")[0]
 
 
 def undeclared_libraries(
@@ -131,14 +65,12 @@ def undeclared_libraries(
     """Third-party imports that ``pyproject`` does not list as a dependency."""
     rows = tomllib.loads(pyproject)["project"]["dependencies"]
     declared = {re.split(r"[^A-Za-z0-9._-]", row.strip())[0] for row in rows}
-    known = _names(modules)
     allowed = stdlib | OPTIONAL | {*PACKAGES, "tests"}
     return [
         f"{module.path}:{line}: {top} is not a dependency in pyproject.toml"
         for module in modules
-        for line, target in imports(module, known)
-        if (top := target.split(".")[0]) not in allowed
-        and DISTRIBUTIONS.get(top, top) not in declared
+        for line, top in libraries(module)
+        if top not in allowed and DISTRIBUTIONS.get(top, top) not in declared
     ]
 
 
@@ -194,7 +126,3 @@ def long_functions(modules: Iterable[Module]) -> list[str]:
         found.append(f"90th percentile of the bodies: {percentile}, at most {MAX_BODY_LINES_P90}")
         found += [f"{where}: {count}" for where, count in sizes.items() if count >= percentile]
     return found
-
-
-def _matches(path: str, patterns: Iterable[str]) -> bool:
-    return any(fnmatchcase(path, pattern) for pattern in patterns)

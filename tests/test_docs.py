@@ -145,10 +145,15 @@ def test_the_reference_names_every_method_of_the_language_with_its_arguments() -
     assert len(described) >= 15
 
 
-def test_the_reference_names_everything_that_the_package_exports() -> None:
+def test_the_reference_names_all_that_is_exported_frames_postures_and_errors() -> None:
     text = page(LANGUAGE)
     missing = [name for name in motions.__all__ if not re.search(rf"`@?{name}\b", text)]
     assert missing == []
+    for frame in (Frame.GROUND, Frame.BODY):
+        assert f'frame="{frame.value}"' in text
+    for posture in Posture:
+        assert f'"{posture.value}"' in text
+    assert len(ERRORS) >= 15
 
 
 def test_the_reference_shows_every_pose_with_its_values() -> None:
@@ -183,14 +188,6 @@ def test_the_reference_knows_every_ease_and_how_it_starts_and_ends() -> None:
             assert shown == pytest.approx(peaks, rel=1e-3), ease
 
 
-def test_the_reference_names_every_frame_and_posture() -> None:
-    text = page(LANGUAGE)
-    for frame in (Frame.GROUND, Frame.BODY):
-        assert f'frame="{frame.value}"' in text
-    for posture in Posture:
-        assert f'"{posture.value}"' in text
-
-
 _ERROR = re.compile(r"^\| `(\S.*?)` \| (.+) \|$", re.MULTILINE)
 ERRORS = _ERROR.findall(page(LANGUAGE).split("## Errors")[1])
 
@@ -201,10 +198,6 @@ def test_an_error_of_the_reference_reads_as_it_says(code: str, message: str) -> 
     with pytest.raises(Go2WbcError) as caught:
         eval(code, names)
     assert str(caught.value) == message
-
-
-def test_the_reference_has_errors() -> None:
-    assert len(ERRORS) >= 15
 
 
 # --- feasibility ------------------------------------------------------------------------------

@@ -35,20 +35,14 @@ PICTURE = "docs/images/demo.webp"
 PYTHON = blocks("README.md", "python")
 
 
-def test_the_readme_is_short_and_has_a_block_to_run() -> None:
+def test_the_readme_is_short_and_begins_with_a_small_moving_picture_and_a_command() -> None:
     assert len(page("README.md").splitlines()) <= MOST_LINES
     assert any(not block.text.startswith(NOT_RUN) for block in PYTHON)
-
-
-def test_the_first_screen_has_a_picture_one_command_and_ten_lines() -> None:
     first = "\n".join(page("README.md").splitlines()[:FIRST_SCREEN])
     assert f"]({PICTURE})" in first
     assert "make demo" in first
     assert PYTHON[0].line < FIRST_SCREEN
     assert len(PYTHON[0].text.splitlines()) <= MOST_LINES_OF_THE_FIRST
-
-
-def test_the_picture_moves_and_is_small_enough_for_the_repository() -> None:
     assert (ROOT / PICTURE).stat().st_size < 1_500_000
     with Image.open(ROOT / PICTURE) as image:
         assert getattr(image, "n_frames", 1) > 50

@@ -25,16 +25,14 @@ checking = pytest.mark.skipif(
 
 
 @checking
-def test_an_array_of_the_wrong_shape_is_refused() -> None:
+def test_an_array_or_argument_of_the_wrong_kind_is_refused_also_late_in_a_loop() -> None:
     assert JointReference(np.zeros(12), np.zeros(12), 1.0, 1.0).kp == 1.0
     with pytest.raises(TypeCheckError, match="v_joints"):
         JointReference(np.zeros(12), np.zeros(11), 1.0, 1.0)
-
-
-@checking
-def test_an_argument_of_the_wrong_type_is_refused() -> None:
     with pytest.raises(TypeCheckError):
         unknown_name("side", 3, ("left", "right"))  # pyright: ignore[reportArgumentType]
+    assert refusals(typechecker.CHECKED_CALLS) == typechecker.CHECKED_CALLS
+    assert refusals(10 * typechecker.STRIDE) == 10
 
 
 def refusals(calls: int) -> int:
@@ -46,12 +44,6 @@ def refusals(calls: int) -> int:
         except TypeCheckError:
             refused += 1
     return refused
-
-
-@checking
-def test_of_the_repetitions_in_a_long_loop_some_are_checked_too() -> None:
-    assert refusals(typechecker.CHECKED_CALLS) == typechecker.CHECKED_CALLS
-    assert refusals(10 * typechecker.STRIDE) == 10
 
 
 @checking

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
 else:  # argparse's class takes no subscript at run time
     Subparsers = argparse._SubParsersAction
-"""What a subcommand's ``register`` adds its parser to."""
+"""What subcommands add their parsers to."""
 
 
 PROGRAM = "go2-wbc"  #: The name of the command line, and of the package
@@ -48,19 +48,6 @@ class ExitCode(IntEnum):
     RUNTIME = 3  #: something broke, or is missing on this machine
     INTERRUPTED = 130  #: Ctrl-C, of what does not wait for it
     BROKEN_PIPE = 141  #: who read the output has gone
-
-
-def add_parser(
-    subparsers: Subparsers, name: str, description: str, *, examples: str
-) -> argparse.ArgumentParser:
-    """Add the parser of the subcommand ``name``; its examples are one line each."""
-    return subparsers.add_parser(
-        name,
-        help=description.partition("\n")[0].replace("%", "%%"),
-        description=description,
-        epilog=examples_epilog(examples),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
 
 
 def examples_epilog(examples: str) -> str:
@@ -103,8 +90,13 @@ def add_command(subparsers: Subparsers, name: str, function: Callable[..., int])
         part if "\n " in part else textwrap.fill(" ".join(part.split()), WIDTH)
         for part in text.split("\n\n")
     ]
-    examples = textwrap.dedent(examples)
-    parser = add_parser(subparsers, name, "\n\n".join(paragraphs), examples=examples)
+    parser = subparsers.add_parser(
+        name,
+        help=paragraphs[0].partition("\n")[0].replace("%", "%%"),
+        description="\n\n".join(paragraphs),
+        epilog=examples_epilog(textwrap.dedent(examples)),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     _add_options(parser, function)
     parser.set_defaults(run=lambda given: _called(function, given))
 

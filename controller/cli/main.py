@@ -3,7 +3,7 @@
 A subcommand is a function whose parameters are its options (see ``options``), and a line in
 ``COMMANDS``. Only the module that was asked for is imported: help is quick, and a broken library
 cannot keep ``doctor`` from starting. ``run_program`` does the same for a program with other
-subcommands, whose modules may make their own parser: ``register(subparsers)``, and ``run(args)``.
+subcommands.
 """
 
 from __future__ import annotations
@@ -42,12 +42,8 @@ class Command:
     def add_to(self, subparsers: Subparsers) -> None:
         """Import it, and add its parser."""
         place, _, name = self.place.partition(":")
-        module = importlib.import_module(place)
-        if (register := getattr(module, "register", None)) is None:
-            add_command(subparsers, self.name, getattr(module, name or "run"))
-            return
-        register(subparsers)
-        subparsers.choices[self.name].set_defaults(run=module.run)
+        function = getattr(importlib.import_module(place), name or "run")
+        add_command(subparsers, self.name, function)
 
 
 COMMANDS = tuple(

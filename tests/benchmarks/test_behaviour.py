@@ -26,20 +26,14 @@ def test_plants_of_trials_differ_within_their_ranges() -> None:
     assert (robots.FRICTION_RANGE, robots.MASS_RANGE) == ((0.6, 1.0), (0.95, 1.05))
 
 
-def test_the_longest_run_is_found() -> None:
+def test_what_was_held_longest_and_slid_farthest_is_found() -> None:
     flags = np.array([1, 0, 1, 1, 0, 1, 1, 1], dtype=bool)
     assert longest_run(flags) == slice(5, 8)
     assert longest_run(np.zeros(3, dtype=bool)) == slice(0, 0)
-
-
-def test_the_held_height_is_the_best_that_was_kept_for_the_whole_time() -> None:
     heights = np.array([0.0, 0.9, 0.59, 0.61, 0.62, 0.6, 0.0])
     assert highest_window(heights, 3) == slice(3, 6)
     with pytest.raises(TrialFailed):
         highest_window(heights, 8)
-
-
-def test_slip_is_the_largest_excursion_and_not_the_final_one() -> None:
     v = np.zeros((201, 4, 3))
     v[1:101, Leg.RL, 0], v[101:, Leg.RL, 0] = 0.02, -0.02  # 4 mm there and back
     recorded = empty_recording(201, v)

@@ -17,8 +17,8 @@ def test_a_name_stands_for_a_group_or_a_scenario_and_none_for_everything(name: s
     assert chosen_studies(STUDIES, [name] if name else []) == expected
 
 
-def test_the_metrics_are_listed_without_the_extras(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_without_the_extras_metrics_are_listed_and_the_line_that_installs_them_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], results_folder: Path
 ) -> None:
     monkeypatch.setitem(sys.modules, "cyclonedds.core", None)
     monkeypatch.setitem(sys.modules, "rclpy", None)
@@ -26,12 +26,6 @@ def test_the_metrics_are_listed_without_the_extras(
     lines = capsys.readouterr().out.splitlines()
     assert {scenario.name for scenario in STUDIES} <= set(lines)
     assert max(map(len, lines)) <= 80
-
-
-def test_without_the_extra_the_line_that_installs_it_is_named(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], results_folder: Path
-) -> None:
-    monkeypatch.setitem(sys.modules, "cyclonedds.core", None)
     assert main(["bridges", "unitree"]) == ExitCode.RUNTIME
     complaint = capsys.readouterr().err
     assert 'pip install "go2-wbc[unitree]"' in complaint

@@ -134,15 +134,14 @@ def test_a_file_that_cannot_be_written_is_told_before_anything_runs(
         assert reason in capsys.readouterr().err
 
 
-def test_list_names_every_scenario_and_threshold(capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_listed_has_its_threshold_and_what_is_unknown_is_told_what_is_valid(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     assert main(["behaviour", "--list"]) == ExitCode.OK
     out = capsys.readouterr().out
     assert all(scenario.name in out.splitlines() for scenario in STUDIES)
     assert "<= 20 mm" in out
     assert max(map(len, out.splitlines())) <= WIDTH
-
-
-def test_an_unknown_scenario_is_a_usage_error_that_lists_the_valid_ones() -> None:
     with pytest.raises(CommandError, match=r"unknown scenario 'gallop'.*goals.*high-five"):
         chosen_studies(STUDIES, ["gallop"])
     assert main(["behaviour", "--rows", "gallop"]) == ExitCode.USAGE

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import envelopes
-from benchmarks.envelopes import ITEMS, MOST, STEPS, collected, holds, render, store, trial
+from benchmarks.envelopes import ITEMS, MOST, STEPS, collected, holds, render, trial, write
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.envelopes import measured_envelopes
 
@@ -30,7 +30,7 @@ def test_what_is_stored_is_what_the_package_reads(tmp_path: Path) -> None:
         for n, (gait, axis) in enumerate(ITEMS)
     ]
     bounds, file = collected(rows), tmp_path / "envelopes.json"
-    store(bounds, file)
+    write(bounds, file)
     kept = json.loads(file.read_text(encoding="utf-8"))["gaits"]
     assert kept == bounds
     assert kept.keys() == GAITS.keys() == measured_envelopes().keys()

@@ -82,26 +82,17 @@ def test_the_errors_of_the_trot_are_drawn_over_its_speed(tmp_path: Path) -> None
     assert main(["evidence", str(page), str(results), "--plot", "speeds.txt"]) == ExitCode.USAGE
 
 
-def test_the_mark_says_which_table_a_page_has() -> None:
+def test_a_table_is_filled_where_its_mark_says_and_nothing_else_changes() -> None:
     rows = {name: {"n": 3, "mean": 0.5, "worst": 0.25} for name in SPEED.metrics}
     page = filled(f"{SPEED_BEGIN}: x -->\nold\n{END}\n", rows)
     assert page == f"{SPEED_BEGIN}: x -->\n{SPEED.text(rows)}\n{END}\n"
     assert "| before |" in page
-
-
-def test_the_table_is_put_between_the_marks_and_nothing_else_changes() -> None:
     text = f"before\n{BEGIN}: x -->\nold\n{END}\nafter\n"
     assert filled(text, ROWS) == f"before\n{BEGIN}: x -->\n{TRUTH.text(ROWS)}\n{END}\nafter\n"
-
-
-def test_of_two_tables_of_a_page_only_that_is_filled_of_which_there_are_results() -> None:
     text = f"{BEGIN} -->\nold\n{END}\n{SENSED_BEGIN} -->\nolder\n{END}\n"
     assert filled(text, ROWS) == text.replace("old\n", f"{TRUTH.text(ROWS)}\n", 1)
     sensed = {name: {"n": 10, "mean": 0.5, "worst": 0.25} for name in SENSED.metrics}
     assert filled(text, sensed) == text.replace("older\n", f"{SENSED.text(sensed)}\n")
-
-
-def test_a_line_that_was_not_measured_stays() -> None:
     before = TRUTH.text(ROWS)
     (first, *_), one = TRUTH.lines, {"n": 9, "mean": 0.125, "worst": 0.25}
     after = TRUTH.text({first.metrics[0]: one}, before).splitlines()

@@ -19,8 +19,11 @@ MOST_BYTES = 3_500_000
 LEAST_CONTRAST = 15.0  # of 255; a blank page has 0
 
 
-def test_the_page_is_what_the_library_says() -> None:
+def test_the_page_is_what_the_library_says_and_its_pictures_are_small() -> None:
     assert (DOCS / "gallery.md").read_text(encoding="utf-8") == gallery.page()
+    files = list(PICTURES.iterdir())
+    assert {file.stem for file in files} == set(motion_names())
+    assert sum(file.stat().st_size for file in files) <= MOST_BYTES
 
 
 @pytest.mark.parametrize("name", motion_names())
@@ -36,12 +39,6 @@ def test_every_motion_has_a_small_picture_that_moves(name: str) -> None:
     assert start.std() > LEAST_CONTRAST
 
 
-def test_all_pictures_together_are_small_and_none_is_left_over() -> None:
-    files = list(PICTURES.iterdir())
-    assert {file.stem for file in files} == set(motion_names())
-    assert sum(file.stat().st_size for file in files) <= MOST_BYTES
-
-
 @pytest.mark.parametrize(("length", "pictures"), [(1.5, 16), (16.0, 81)])
 def test_a_loop_shows_all_of_a_run_and_a_long_one_faster(length: float, pictures: int) -> None:
     run = synthetic_recording(script=(("stand", length),))
@@ -50,16 +47,13 @@ def test_a_loop_shows_all_of_a_run_and_a_long_one_faster(length: float, pictures
         assert getattr(image, "n_frames", 1) == pictures
 
 
-def test_a_run_becomes_a_looping_film_that_starts_just_before_the_first_step() -> None:
+def test_the_film_starts_just_before_the_first_step_moves_loops_and_is_small() -> None:
     run = gallery.from_first_step(synthetic_recording(script=(("stand", 1.5), ("walk", 1.4))))
     assert run.labels[0] == "stand"
     assert run.spans()[1].start == pytest.approx(gallery.LEAD, abs=0.02)
-    with Image.open(io.BytesIO(gallery.film(run))) as image:
+    with Image.open(io.BytesIO(gallery.film_of(run))) as image:
         assert image.info["loop"] == 0
         assert getattr(image, "n_frames", 1) == 1 + round(20.0 / gallery.FILM_SPEED)
-
-
-def test_the_film_of_the_readme_is_small_and_has_moving_pictures() -> None:
     assert DEMO.stat().st_size <= gallery.FILM_SIZE_LIMIT
     with Image.open(DEMO) as image:
         assert image.size == gallery.FILM_STYLE.size

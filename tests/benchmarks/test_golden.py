@@ -51,11 +51,14 @@ def heavier() -> Config:
     return Config(wbc=replace(wbc, force_weight=wbc.force_weight * (1.0 + 1e-6)))
 
 
-def test_the_same_runs_are_equal(
+def test_the_same_runs_are_equal_and_what_is_near_within_a_tolerance(
     recorded: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert compared(recorded, monkeypatch) == ExitCode.OK
     assert capsys.readouterr().out.split() == ["rise", "equal", "walk", "equal"]
+    names = ("--runs", "walk", "--tolerance")
+    assert compared(recorded, monkeypatch, heavier(), *names, "1e-2") == ExitCode.OK
+    assert compared(recorded, monkeypatch, heavier(), *names, "1e-300") == ExitCode.FAILED
 
 
 def test_a_weight_that_differs_by_a_millionth_is_found_in_the_solution(
@@ -66,12 +69,6 @@ def test_a_weight_that_differs_by_a_millionth_is_found_in_the_solution(
     assert rise.split() == ["rise", "equal"]
     assert "first in the solution: " in walk
     assert re.search(r"\] by \d\S*, \S+ for \S+ at tick \d+$", walk), walk
-
-
-def test_a_tolerance_accepts_what_is_near(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    names = ("--runs", "walk", "--tolerance")
-    assert compared(recorded, monkeypatch, heavier(), *names, "1e-2") == ExitCode.OK
-    assert compared(recorded, monkeypatch, heavier(), *names, "1e-300") == ExitCode.FAILED
 
 
 def test_an_unknown_run_and_a_missing_record_are_told(

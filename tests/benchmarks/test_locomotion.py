@@ -26,7 +26,9 @@ def fallen() -> TruthRecording:
     return recorded
 
 
-def test_errors_are_along_the_command_and_count_both_ways(fallen: TruthRecording) -> None:
+def test_errors_are_along_the_command_both_ways_and_turning_by_the_heading(
+    fallen: TruthRecording,
+) -> None:
     n, dt = len(fallen.time), np.diff(fallen.time)[:, None]
     along, across = np.array([0.6, 0.8, 0.0]), np.array([-0.8, 0.6, 0.0])
     sway = np.where(np.arange(n - 1) % 2, 0.1, -0.1)[:, None]
@@ -39,9 +41,6 @@ def test_errors_are_along_the_command_and_count_both_ways(fallen: TruthRecording
     assert values["mae"] == pytest.approx(0.1, abs=1e-4)
     assert values["cost"] == pytest.approx(8 * 2.0 * 3.0 / (16.0 * 9.81 * 0.5))
     assert {f"any.{name}" for name in values} == {m.name for m in run.study.metrics}
-
-
-def test_turning_is_judged_by_the_heading(fallen: TruthRecording) -> None:
     rpy = np.zeros((len(fallen.time), 3))
     rpy[:, 2] = 2.2 * fallen.time
     run = Run("any", "trot", VelocityCommand(0.0, 0.0, 2.0), 1.0)

@@ -19,7 +19,7 @@ from benchmarks.probability import (
     save_reliability,
     store,
 )
-from benchmarks.probability_fit import Sample, _loss, calibration, fit
+from benchmarks.probability_fit import Sample, _loss, calibration, fit_model
 from benchmarks.probability_runs import PAYLOAD, WORLDS, exam, mixed, runs, world_of
 from benchmarks.validation_set.drawing import TEST, TRAIN
 from controller.sweeps.sweep_file import Row
@@ -60,12 +60,17 @@ def test_what_is_stored_is_the_model_and_what_it_was_fitted_to(tmp_path: Path) -
     )
 
 
-def test_every_run_is_a_line_with_the_chance_that_was_stated() -> None:
+def test_every_run_is_a_line_with_its_chance_and_a_passed_one_that_fell_is_named() -> None:
     lines = list(csv.DictReader(io.StringIO(csv_of(MODEL, ROWS).decode())))
     assert len(lines) == len(ROWS)
     assert tuple(lines[0]) == (*COLUMNS, "chance")
     assert (lines[3]["refused"], lines[3]["done"], lines[3]["payload"]) == ("1", "0", "1.235")
     assert float(lines[15]["chance"]) == pytest.approx(MODEL.probability({"slip": 0.01}), abs=5e-4)
+    rows = [*ROWS, _row(20, slip=0.01, done=False, fell=True), _row(21, slip=-1.0, done=False)]
+    assert [row["seed"] for row in passed_that_fell(rows)] == [20]
+    text = render(judge(MODEL, rows), rows, {})
+    assert "motions that passed in their world and fell there: 1 of 11" in text
+    assert "seed 20: nod 4, friction 0.50, 1.2 kg" in text
 
 
 def test_the_diagram_has_a_point_for_every_bin_with_runs(tmp_path: Path) -> None:
@@ -75,14 +80,6 @@ def test_the_diagram_has_a_point_for_every_bin_with_runs(tmp_path: Path) -> None
     assert "20 runs of the test half" in text
     assert "chance stated" in text
     assert all(f">{count}<" in text for *_, count in judged.bins)
-
-
-def test_a_passed_motion_that_fell_is_counted_and_named() -> None:
-    rows = [*ROWS, _row(20, slip=0.01, done=False, fell=True), _row(21, slip=-1.0, done=False)]
-    assert [row["seed"] for row in passed_that_fell(rows)] == [20]
-    text = render(judge(MODEL, rows), rows, {})
-    assert "motions that passed in their world and fell there: 1 of 11" in text
-    assert "seed 20: nod 4, friction 0.50, 1.2 kg" in text
 
 
 # --- the fit ----------------------------------------------------------------------------------
@@ -119,7 +116,7 @@ def test_the_gradient_of_the_loss_is_that_of_finite_differences() -> None:
 
 
 def test_the_fit_finds_what_made_the_data_and_is_calibrated_on_others() -> None:
-    model = fit(_samples(2, 4000))
+    model = fit_model(_samples(2, 4000))
     for name, rise in TRUTH.rises.items():
         found, even = model.rises[name], rise.unit * math.sinh(rise.centre)
         assert found.unit * math.sinh(found.centre) == pytest.approx(even, abs=0.3 * rise.unit)
@@ -171,14 +168,11 @@ def test_every_beginning_of_the_exam_is_mixed_evenly(count: int) -> None:
         assert first[kind] == pytest.approx(total * count / len(asked), abs=2.0)
 
 
-def test_no_family_comes_again_in_a_stratum_before_all_have_come() -> None:
+def test_the_order_of_the_exam_is_mixed_and_loses_no_motion() -> None:
     of_one = [q for q in exam() if (q.family.half, q.stratum) == (TRAIN, "easy")]
     quasi_static = [q.family.name for q in of_one if not q.family.is_dynamic]
     families = set(quasi_static)
     assert set(quasi_static[: len(families)]) == families
-
-
-def test_mixing_loses_no_motion() -> None:
     asked = exam()
     assert sorted(q.name for q in mixed(asked[:50])) == sorted(q.name for q in asked[:50])
 

@@ -88,16 +88,13 @@ def test_what_does_not_hold_is_noticed(
     assert judged(call, *arguments, **{call: does}) == {row}
 
 
-def test_what_does_not_end_is_noticed(
+def test_a_second_thread_must_be_refused_and_what_does_not_end_is_noticed(
     judged: Callable[..., set[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sequences, "HANGS", 0.3)
-    assert judged("wait", 1.0) == {"hangs"}
-
-
-def test_a_second_thread_must_be_refused(judged: Callable[..., set[str]]) -> None:
     assert judged("wait", 0.5, other="stand") == set()
     assert judged("wait", 0.5, other="stand", stand=agree) == {"errors"}
+    monkeypatch.setattr(sequences, "HANGS", 0.3)
+    assert judged("wait", 1.0) == {"hangs"}
 
 
 def test_sinking_as_it_was_told_to_is_no_fall() -> None:

@@ -40,8 +40,11 @@ def measured(name: str) -> dict[str, float]:
     return found.values
 
 
-def test_both_solve_the_same_ticks_in_every_contact_mode() -> None:
+def test_both_solve_the_same_ticks_which_are_packed_again_if_they_came_unpacked() -> None:
     assert min(measured("solves").values()) > 0.0
+    ticks = recorded_ticks(Trial(0))
+    for tick in (tick for kept in ticks.values() for tick in kept):
+        assert (tick.asked()._row is not None) == tick.is_packed
 
 
 def test_placo_is_asked_for_the_same_torques(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -51,12 +54,6 @@ def test_placo_is_asked_for_the_same_torques(monkeypatch: pytest.MonkeyPatch) ->
     tau = BarePlaco(model, config).tick(standing.state, standing.reference)
     ours = WholeBodyController(model).solve(standing.snapshot, standing.reference)
     assert np.abs((tau - ours.tau)[2::3]).max() < KNEE_DIFFERENCE
-
-
-def test_a_reference_is_packed_again_for_every_measurement_if_it_came_unpacked() -> None:
-    ticks = recorded_ticks(Trial(0))
-    for tick in (tick for kept in ticks.values() for tick in kept):
-        assert (tick.asked()._row is not None) == tick.is_packed
 
 
 def test_a_tick_is_timed_in_every_mode() -> None:

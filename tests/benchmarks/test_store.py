@@ -75,16 +75,15 @@ def test_more_seeds_only_add_to_what_is_there_and_without_resume_all_is_measured
     assert later.seeds == seeds
 
 
-def test_trials_come_back_to_the_last_bit(folder: Path) -> None:
+def test_trials_come_back_to_the_last_bit_as_rows_that_say_what_they_depend_on(
+    folder: Path,
+) -> None:
     with opened(folder, [TROT], resume=True) as store:
         found = store.finished
     assert set(found) == {("trot", 0), ("trot", 7)}
     assert found["trot", 0] == FIRST
     assert found["trot", 7] == replace(SECOND, values={"b": 0.0}), "nan is no value"
     assert math.copysign(1.0, found["trot", 7].values["b"]) == -1.0
-
-
-def test_trials_are_rows_of_a_sweep_that_says_what_they_depend_on(folder: Path) -> None:
     kept = read_sweep(file_of(folder, TROT))
     assert kept.about == {"what": "trot", **settings_header()}
     assert set(kept.about) == {"what", "version", "python", "libraries", "settings", "code"}

@@ -59,16 +59,13 @@ def test_a_bug_is_raised_and_not_counted() -> None:
         results_of(fake(have_a_bug), seeds=1)
 
 
-def test_every_seed_of_every_scenario_is_run_once() -> None:
+def test_every_seed_is_run_once_in_processes_as_one_after_the_other() -> None:
     more = Study("more", TABLE, measure_badly, seed_factor=2)
     results = results_of(fake(), more, seeds=2)
     assert {name: sorted(trials) for name, trials in results.items()} == {
         "fake": [0, 1],
         "more": [0, 1, 2, 3],
     }
-
-
-def test_processes_give_the_same_as_one_after_the_other() -> None:
     assert results_of(fake(), seeds=3, jobs=2) == results_of(fake(), seeds=3)
 
 

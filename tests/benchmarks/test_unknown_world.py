@@ -35,13 +35,10 @@ def asked(robot: Robot, sensors: str = IDEAL) -> TrialResult:
     return replace(robot.study, measure=measure, sensors=sensors).run(0)
 
 
-def test_a_run_is_done_by_a_robot_that_walks_and_stands_again() -> None:
+def test_a_run_is_done_by_a_robot_that_walks_and_stands_again_and_by_none_at_a_wall() -> None:
     done = measured(QUICK)
     assert done.values["any.done"] == 1.0
     assert set(done.values) == {metric.name for metric in QUICK.study.metrics}
-
-
-def test_a_robot_before_a_wall_has_not_done_it() -> None:
     wall = replace(QUICK, settings={"terrain": Stairs(height=0.4, count=1, start=0.5)}, time=1.5)
     failed = measured(wall)
     assert failed.values["any.done"] == 0.0
@@ -81,16 +78,12 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("short")
-def test_a_robot_that_does_it_all_has_every_value() -> None:
+def test_what_comes_after_a_call_that_fails_is_not_done_and_all_that_was_has_its_value() -> None:
     robot = Robot("any", "as the controller knows it", JointDynamics())
     found = asked(robot, IMU)
     assert found.reason == ""
     assert set(found.values) == {metric.name for metric in robot.study.metrics}
     assert all(found.values[f"any.{call}"] == 1.0 for call in CALLS)
-
-
-@pytest.mark.usefixtures("short")
-def test_what_comes_after_a_call_that_fails_is_not_done() -> None:
     stuck = Robot("any", "joints that hardly move", JointDynamics(friction_loss=(12.0, 12.0, 12.0)))
     found = asked(stuck)
     assert found.reason != ""

@@ -52,15 +52,12 @@ def test_a_motion_that_is_cancelled_before_it_begins_is_not_played(
     assert go2.progress == 0.0
 
 
-def test_a_plan_that_has_not_begun_has_made_no_progress(plan: CompiledPlan) -> None:
+def test_progress_grows_from_nothing_to_all_once_a_motion_has_begun(plan: CompiledPlan) -> None:
     # It had no attribute to tell it by.
     playing = PlayPlan(plan)
     assert playing.progress == 0.0
     playing.return_safely()
     assert playing.progress == 0.0
-
-
-def test_progress_grows_from_nothing_to_all_while_a_motion_plays() -> None:
     plant, seen = WatchedPlant(), []
     with GO2Controller(plant=plant) as go2:
         assert go2.stand()

@@ -54,11 +54,17 @@ def test_over_a_terrain_the_robot_walks_by_sight_and_its_recording_has_the_groun
     assert np.median(ground[on_it, 2]) == pytest.approx(0.12, abs=0.015)
 
 
-def test_the_walking_speed_is_measured_and_not_the_command() -> None:
+def test_the_walking_speed_is_measured_and_who_creeps_on_has_not_stopped(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     step = step_of(FakeGo2(speed_share=0.75), "forward")
     assert figure_of(step, "mean speed").measured == pytest.approx(0.15, rel=1e-6)
     assert not step.ok
     assert step.reason == "mean speed 0.15 m/s, asked 0.2 +- 0.02"
+    monkeypatch.setattr(FakeGo2, "stop", lambda self: None)
+    step = step_of(FakeGo2(), "stop")
+    assert not step.ok
+    assert "speed at the end 0.2 m/s" in step.reason
 
 
 @pytest.mark.parametrize("yaw", [0.0, 3.0, -2.0])
@@ -70,22 +76,12 @@ def test_way_and_turn_are_seen_from_the_robot_whatever_its_heading(yaw: float) -
     assert figure_of(steps["turn"], "turned left").measured == pytest.approx(90.0, abs=1e-6)
 
 
-def test_a_robot_that_creeps_on_has_not_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(FakeGo2, "stop", lambda self: None)
-    step = step_of(FakeGo2(), "stop")
-    assert not step.ok
-    assert "speed at the end 0.2 m/s" in step.reason
-
-
-def test_a_call_that_returns_false_fails_its_step_with_its_reason() -> None:
+def test_a_step_that_fails_is_told_why_and_the_demo_goes_on() -> None:
     report = run_demo(FakeGo2(refusals={"high_five": "the paw was not held at 0.62 m"}))
     failed = [step for step in report.steps if not step.ok]
     assert [step.name for step in failed] == ["high_five"]
     assert failed[0].reason == "the paw was not held at 0.62 m"
     assert not report.ok
-
-
-def test_an_error_of_a_step_fails_it_and_the_demo_goes_on() -> None:
     report = run_demo(FakeGo2(errors={"high_five": IkError("paw 0.1 m off\ntable")}))
     assert [step.ok for step in report.steps] == [True] * 6 + [False, True]
     assert report.steps[6].reason == "paw 0.1 m off"
@@ -97,22 +93,16 @@ def test_a_plant_that_fails_ends_the_demo() -> None:
         run_demo(FakeGo2(errors={"walk": PlantTimeout("silent")}))
 
 
-def test_after_a_fall_the_other_steps_are_reported_as_not_run() -> None:
+def test_after_a_fall_and_while_nothing_walks_steps_are_told_as_not_done() -> None:
     go2 = FakeGo2(falls_in="walk")
     report = run_demo(go2)
     assert [step.ok for step in report.steps] == [True, True] + [False] * 6
     assert report.steps[2].reason.startswith("fell at t=3.20 s")
     assert {step.reason for step in report.steps[3:]} == {"not run: the robot has fallen"}
     assert "move" not in go2.calls
-
-
-def test_a_fall_while_waiting_fails_the_walk() -> None:
     step = step_of(FakeGo2(falls_in="wait"), "forward")
     assert not step.ok
     assert step.reason.startswith("fell at")
-
-
-def test_there_is_nothing_to_stop_unless_the_robot_walks() -> None:
     stop = next(step for step in DEMO_STEPS if step.name == "stop")
     report = run_demo(FakeGo2(), steps=[stop])
     assert report.steps[0].reason == "move() needs walking mode, not lying"
@@ -135,21 +125,15 @@ def test_margin_and_load_count_on_three_legs_only_and_for_supporting_feet() -> N
     assert all(math.isnan(value) for value in three_leg_minima(FakeGo2().recording()))
 
 
-def test_qp_failures_before_the_demo_are_not_its_own() -> None:
+def test_only_its_own_failures_and_times_count_and_add_up() -> None:
     go2 = FakeGo2()
     go2.telemetry.qp_failures += 1
     assert run_demo(go2).totals.qp_failures == 0
-
-
-def test_times_add_up() -> None:
     report = run_demo(FakeGo2())
     assert report.totals.robot_time == pytest.approx(sum(step.duration for step in report.steps))
     starts = np.array([step.start for step in report.steps])
     ends = starts + [step.duration for step in report.steps]
     np.testing.assert_allclose(starts[1:], ends[:-1])
-
-
-def test_the_real_time_factor_is_robot_time_per_cpu_time() -> None:
     totals = run_demo(FakeGo2()).totals
     assert replace(totals, robot_time=24.0, cpu_time=8.0).real_time_factor == 3.0
     assert math.isnan(replace(totals, cpu_time=0.0).real_time_factor)
@@ -180,16 +164,13 @@ def test_a_figure_is_met_within_its_tolerance(
     assert Measurement("x", measured, "m", asked, tolerance).is_met is met
 
 
-def test_the_module_of_the_console_script_imports_no_library() -> None:
+def test_the_module_of_the_console_script_imports_no_library_and_knows_its_names() -> None:
     """A broken library must end in a message that names ``doctor``, not in a traceback."""
     code = "import sys, controller.demo; print(*sys.modules)"
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     )
     assert HEAVY & set(done.stdout.split()) == set()
-
-
-def test_an_unknown_name_of_the_module_is_an_attribute_error() -> None:
     import controller.demo
 
     with pytest.raises(AttributeError, match="no_such_name"):

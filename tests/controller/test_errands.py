@@ -43,20 +43,17 @@ def counting(end: int) -> Callable[[], int | Pending]:
     return work
 
 
-def test_the_thread_that_serves_does_the_work_and_nothing_is_an_answer_too(
+def test_the_thread_that_serves_does_the_work_once_a_round_until_it_answers(
     errands: Errands, serving: threading.Thread
 ) -> None:
     assert errands.ask(threading.current_thread, HANG_GUARD) is serving
     assert errands.ask(lambda: None, HANG_GUARD) is None
-
-
-def test_an_errand_is_done_once_a_round_until_it_answers(
-    errands: Errands, serving: threading.Thread
-) -> None:
     work = counting(5)
     assert errands.ask(work, HANG_GUARD) == 5
     assert errands.ask(lambda: None, HANG_GUARD) is None
     assert work() == 6
+    asked = [in_thread(lambda end=end: errands.ask(counting(end), HANG_GUARD)) for end in (9, 3, 6)]
+    assert [answer.result(HANG_GUARD) for answer in asked] == [9, 3, 6]
 
 
 @pytest.mark.parametrize("error", [ValueError("a bug"), SystemExit(3)])
@@ -70,11 +67,6 @@ def test_an_error_is_raised_where_the_errand_was_asked_for_and_the_thread_goes_o
         errands.ask(fail, HANG_GUARD)
     assert caught.value is error
     assert errands.ask(lambda: 1, HANG_GUARD) == 1
-
-
-def test_many_threads_get_their_own_answers(errands: Errands, serving: threading.Thread) -> None:
-    asked = [in_thread(lambda end=end: errands.ask(counting(end), HANG_GUARD)) for end in (9, 3, 6)]
-    assert [answer.result(HANG_GUARD) for answer in asked] == [9, 3, 6]
 
 
 def test_who_is_not_served_is_told_and_what_was_asked_is_not_done_later(errands: Errands) -> None:
@@ -95,15 +87,12 @@ def test_an_errand_that_takes_long_is_no_loop_that_hangs(
     assert answer.result(HANG_GUARD) is True
 
 
-def test_what_was_asked_before_the_end_is_done_at_the_end(errands: Errands) -> None:
+def test_what_was_asked_before_the_end_is_done_and_later_or_unserved_not(errands: Errands) -> None:
     answer = in_thread(lambda: errands.ask(lambda: 1, HANG_GUARD))
     while errands._asked.empty():
         pass
     errands.end()
     assert answer.result(HANG_GUARD) == 1
-
-
-def test_what_is_asked_after_the_end_is_not_done(errands: Errands) -> None:
     done: list[int] = []
     errands.end()
     with pytest.raises(LoopEnded):

@@ -117,24 +117,18 @@ def test_a_call_that_only_commands_returns_nothing_and_only_waiting_takes_time(d
     assert np.abs(day["stop"].after.v[:3]).max() < 0.1, "at rest"
 
 
-def test_a_standing_robot_is_level_on_four_feet(day: Day) -> None:
+def test_a_robot_stands_level_sits_and_lies_on_its_belly(day: Day) -> None:
     for name in ("stand", "stand from sitting", "stand from lying"):
         state = day[name].after
         assert state.tilt < 0.1
         assert state.feet_in_contact.all()
         assert state.q[2] == pytest.approx(0.31, abs=0.02)
-
-
-def test_a_sitting_robot_has_its_rump_down_and_its_front_legs_up(day: Day) -> None:
     # From walking, the rear legs once crossed a singularity, rattled, and never came to rest.
     for name in ("sit", "sit from walking"):
         state = day[name].after
         assert state.rpy[1] < np.radians(-30)
         assert state.feet_in_contact.all()
         assert np.abs(state.v).max() < 0.2
-
-
-def test_a_lying_robot_has_its_belly_on_the_ground(day: Day) -> None:
     # It once rested on its folded legs, 2 cm above the ground, and called it lying.
     state = day["lie down"].after
     assert state.q[2] < 0.09

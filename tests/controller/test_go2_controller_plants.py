@@ -73,7 +73,7 @@ def test_with_noisy_sensors_the_robot_stands_and_trots() -> None:
         assert go2.state.q[0] - start == pytest.approx(0.4 * 3.0, rel=0.2)
 
 
-def test_without_a_display_the_robot_goes_on_without_the_viewer(
+def test_no_viewer_where_there_is_no_display_or_another_plant(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("sys.platform", "linux")
@@ -82,9 +82,6 @@ def test_without_a_display_the_robot_goes_on_without_the_viewer(
     with GO2Controller(plant=MujocoPlant(), viewer=True) as go2:
         go2.wait(0.1)
     assert "no viewer: cannot open the viewer: there is no display" in caplog.text
-
-
-def test_the_viewer_is_not_for_other_plants(caplog: pytest.LogCaptureFixture) -> None:
     with GO2Controller(plant=StillPlant(), viewer=True):
         assert "the viewer shows MuJoCo plants only" in caplog.text
 

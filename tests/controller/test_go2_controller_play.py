@@ -120,12 +120,18 @@ def two_feet(model: RobotModel) -> CompiledPlan:
     return compile_timeline(line.home(over=0.4), model)
 
 
-def test_a_plant_that_may_be_a_robot_is_not_sent_a_dynamic_motion(two_feet: CompiledPlan) -> None:
+def test_a_plant_that_may_be_a_robot_is_not_sent_a_dynamic_motion_and_what_simulates_is(
+    two_feet: CompiledPlan,
+) -> None:
     with GO2Controller(plant=LivePlant(), realtime=True) as go2:
         with pytest.raises(DynamicMotionRefused, match="LivePlant may move a robot") as caught:
             go2.play(two_feet, check=False)
         assert "play(..., allow_dynamic=True)" in str(caught.value)
         assert not go2.last_outcome
+    plant = GroundTruth(MujocoPlant())
+    assert not plant.is_hardware
+    assert LivePlant().is_hardware
+    plant.close()
 
 
 @pytest.mark.parametrize("is_simulated", [False, True])
@@ -138,13 +144,6 @@ def test_who_allows_it_or_simulates_gets_as_far_as_with_any_other_motion(
             is_allowed = plan is two_feet and not is_simulated
             with pytest.raises(StanceMismatch, match="the robot is lying"):
                 go2.play(plan, check=False, allow_dynamic=is_allowed)
-
-
-def test_what_simulates_says_so() -> None:
-    plant = GroundTruth(MujocoPlant())
-    assert not plant.is_hardware
-    assert LivePlant().is_hardware
-    plant.close()
 
 
 def test_a_motion_is_played_as_often_as_asked() -> None:

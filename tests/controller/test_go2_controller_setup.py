@@ -89,15 +89,14 @@ def test_a_solver_that_is_unknown_or_not_installed_is_refused_with_what_helps(
         GO2Controller(config=Config(wbc=replace(WbcConfig(), solver=solver)))
 
 
-def test_an_unknown_back_end_is_refused_with_the_valid_ones_and_the_plant_left_untouched(
+def test_an_unknown_back_end_and_a_plant_that_cannot_be_read_are_refused(
     plant: WatchedPlant,
 ) -> None:
     with pytest.raises(ConfigError, match="valid: condensed, full, placo"):
         GO2Controller(plant=plant, config=Config(backend="magic"))
+    with pytest.raises(ConfigError, match="of which robot"):
+        GO2Controller(plant=plant, config=Config.of_robot("a1"))
     assert not plant.commands
-
-
-def test_a_plant_that_cannot_be_read_is_refused_at_once(plant: WatchedPlant) -> None:
     plant.close()
     with pytest.raises(ClosedError, match="plant is closed"):
         GO2Controller(plant=plant)
@@ -157,14 +156,12 @@ def pitching(*tasks: Task) -> float:
         return float(np.sqrt(np.mean(run.v[run.time > run.time[-1] - 2.0, 4] ** 2)))
 
 
-def test_a_task_of_ones_own_is_followed_while_the_robot_walks() -> None:
+def test_a_task_of_ones_own_is_followed_on_the_way_and_in_plans_with_few_feet(
+    plant: WatchedPlant,
+) -> None:
     task = SteadyTrunk()
     assert pitching(task) < 0.6 * pitching()
     assert len(task.asked) > 1500
-
-
-def test_a_task_of_ones_own_is_asked_in_plans_with_few_feet_too(plant: WatchedPlant) -> None:
-    task = SteadyTrunk()
     pilot = build_pilot(plant, Config(), extra_tasks=(task,))
     try:
         loop = pilot.runner.loop
@@ -174,12 +171,9 @@ def test_a_task_of_ones_own_is_asked_in_plans_with_few_feet_too(plant: WatchedPl
         pilot.close()
 
 
-def test_placo_takes_no_tasks_of_ones_own(plant: WatchedPlant) -> None:
+def test_a_robot_rises_and_walks_by_placo_without_tasks_of_ones_own(plant: WatchedPlant) -> None:
     with pytest.raises(ConfigError, match="the placo back end"):
         GO2Controller(plant=plant, config=Config(backend="placo"), extra_tasks=[SteadyTrunk()])
-
-
-def test_a_robot_rises_and_walks_by_placo(plant: WatchedPlant) -> None:
     with GO2Controller(plant=plant, config=Config(backend="placo")) as go2:
         assert go2._runner.loop.wbc.backend_name == "placo"
         assert go2.walk()

@@ -26,22 +26,16 @@ def checked() -> CheckedMotion:
     return FeasibilityChecker().evaluate(load_motion("wave").hold(3.6))
 
 
-def test_a_motion_of_ten_seconds_is_a_page_and_its_table(checked: CheckedMotion) -> None:
+def test_a_motion_and_a_report_are_a_page_a_table_and_a_picture(checked: CheckedMotion) -> None:
     shown = html_of(checked)
     assert shown
     assert len(shown.encode()) < LARGEST
     assert shown.startswith("<iframe srcdoc=")
     assert "the robot can do it" in shown
-
-
-def test_a_report_is_a_table_with_the_margins_as_a_picture(checked: CheckedMotion) -> None:
     shown = html_of(checked.report)
     assert shown
     assert "<pre>check " in shown
     assert 'src="data:image/png;base64,' in shown
-
-
-def test_a_sweep_is_a_table_and_a_recording_a_page(checked: CheckedMotion) -> None:
     assert "<iframe" in (html_of(checked.recording()) or "")
     columns = {"seed": "int", "ok": "bool", "speed": "float"}
     rows: list[Row] = [{"seed": seed, "ok": seed > 0, "speed": 0.5 * seed} for seed in range(3)]

@@ -176,10 +176,20 @@ def test_what_was_not_done_is_answered_with_the_reason(client: Client, error: Ex
     assert client.does("sit", failing(error)) == Outcome(False, str(error), error=error)
 
 
-def test_a_job_that_may_not_begin_is_refused_when_its_turn_has_come(client: Client) -> None:
+def test_a_job_that_may_not_begin_or_is_called_off_too_late_or_never_was_one(
+    client: Client, robot: Robot
+) -> None:
     client.submit("rise", failing(AssertionError("carried out")), begin=lambda: "it does not sit")
     client.jobs.work()
     assert client.only("rise") == Outcome(False, "it does not sit", is_refused=True)
+    assert not client.jobs.cancel(failing(AssertionError("told")))
+    assert robot.calls == []
+
+    def act(_job: Job) -> Measurements:
+        client.jobs.cancel()
+        return {}
+
+    assert client.does("sit", act) == Outcome(True, "done in 0.0 s")
 
 
 def test_a_bug_in_an_action_is_answered_and_the_server_goes_on(
@@ -347,19 +357,6 @@ def test_a_job_that_is_called_off_says_so_and_then_whoever_wants_to_know_is_told
     assert (answer.ok, answer.cancelled, answer.is_refused) == (False, True, False)
     assert answer.reason == "nod was cancelled"
     assert robot.calls == ["cancel", "told"]
-
-
-def test_without_a_job_there_is_nothing_to_call_off(robot: Robot, client: Client) -> None:
-    assert not client.jobs.cancel(failing(AssertionError("told")))
-    assert robot.calls == []
-
-
-def test_a_job_that_was_done_although_it_was_called_off_is_done(client: Client) -> None:
-    def act(_job: Job) -> Measurements:
-        client.jobs.cancel()
-        return {}
-
-    assert client.does("sit", act) == Outcome(True, "done in 0.0 s")
 
 
 def test_going_limp_ends_what_runs_and_refuses_what_waits(robot: Robot, threaded: Client) -> None:

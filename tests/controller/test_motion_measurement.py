@@ -43,12 +43,11 @@ def slip(plan: MotionPlan, start: float, end: float) -> float:
     return _slip(empty_recording(n, velocity), plan, PERIOD)
 
 
-def test_a_standing_foot_that_slides_counts_by_its_way(raised: CompiledPlan) -> None:
+def test_a_standing_foot_that_slides_counts_and_one_in_the_air_or_just_landed_not(
+    raised: CompiledPlan,
+) -> None:
     start = PERIOD * touchdown(raised) + SETTLED_CONTACT + 5 * PERIOD
     assert slip(raised, start, start + 0.02) == pytest.approx(SKID * 0.02)
-
-
-def test_a_foot_in_the_air_or_just_landed_may_move(raised: CompiledPlan) -> None:
     landed = PERIOD * touchdown(raised)
     assert slip(raised, landed - 0.1, landed + SETTLED_CONTACT - PERIOD) == 0.0
 
@@ -119,15 +118,10 @@ def touchdown(plan: CompiledPlan) -> int:
     return in_air[-1] + 1
 
 
-def test_a_robot_that_does_what_is_written_is_nowhere_off(
+def test_what_is_done_as_written_is_nowhere_off_and_a_trunk_beside_its_place_is_seen(
     raised: CompiledPlan, model: RobotModel
 ) -> None:
     assert off_written(followed(raised), raised, model).max() < 1e-6
-
-
-def test_a_trunk_beside_its_place_or_turned_is_seen(
-    raised: CompiledPlan, model: RobotModel
-) -> None:
     truth = followed(raised)
     p, rpy = truth.p_world_com.copy(), truth.rpy.copy()
     p[300:310, 1] += SHIFT
@@ -136,7 +130,7 @@ def test_a_trunk_beside_its_place_or_turned_is_seen(
     assert found == pytest.approx([SHIFT, 0.1, 0.0, 0.0], abs=1e-6)
 
 
-def test_a_foot_in_the_air_counts_as_paw_and_one_that_has_come_down_as_landed(
+def test_a_foot_counts_as_a_paw_in_the_air_and_as_landed_once_it_has_settled(
     raised: CompiledPlan, model: RobotModel
 ) -> None:
     truth, down = followed(raised), touchdown(raised)
@@ -148,12 +142,6 @@ def test_a_foot_in_the_air_counts_as_paw_and_one_that_has_come_down_as_landed(
     assert found == pytest.approx([0.0, 0.0, SHIFT, 0.0], abs=1e-6)
     found = off_written(replace(truth, p_world_feet=landed), raised, model)
     assert found == pytest.approx([0.0, 0.0, 0.0, SHIFT], abs=1e-6)
-
-
-def test_a_foot_that_settles_in_time_has_landed_well(
-    raised: CompiledPlan, model: RobotModel
-) -> None:
-    truth, down = followed(raised), touchdown(raised)
     late = truth.p_world_feet.copy()
     late[down : down + round(0.5 * LANDED / PERIOD), Leg.FR, 2] += SHIFT
     found = off_written(replace(truth, p_world_feet=late), raised, model)

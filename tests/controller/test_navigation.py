@@ -123,20 +123,19 @@ def test_an_ideal_robot_walks_the_distance_along_its_heading(
     assert end.q[:2] == pytest.approx(goal, abs=0.01)
 
 
-def test_a_robot_beside_its_line_is_led_back_to_it() -> None:
+def test_a_robot_is_led_back_to_its_line_and_its_place_in_a_time_limit() -> None:
     goal = begun(DriveStraight(1.0), pose())
     assert goal.command(pose(y=0.1)).linear_y < 0.0
     assert goal.command(pose(y=-0.1)).linear_y > 0.0
     assert goal.command(pose(yaw=0.1)).angular_z < 0.0
-
-
-def test_a_turning_robot_that_drifts_is_led_back_to_its_place() -> None:
     goal = begun(TurnInPlace(pi / 2), pose())
     assert goal.command(pose(x=0.1)).linear_x < 0.0
     # A quarter turn on, the start lies behind it to its left.
     turned = goal.command(pose(x=0.1, yaw=pi / 2))
     assert turned.linear_y > 0.0
     assert abs(turned.linear_x) < EXACT
+    assert TurnInPlace(2.0).time_limit >= 3 * 2.0 / TURN_RATE
+    assert DriveStraight(-2.0).time_limit >= 3 * 2.0 / WALK_SPEED
 
 
 @pytest.mark.parametrize(
@@ -169,11 +168,6 @@ def test_a_robot_that_is_still_moving_is_not_done() -> None:
     turning.v[5] = 0.3
     assert not turn.is_done(turning)
     assert turn.is_done(pose(yaw=0.5))
-
-
-def test_the_time_limit_leaves_three_times_the_time_at_full_speed() -> None:
-    assert TurnInPlace(2.0).time_limit >= 3 * 2.0 / TURN_RATE
-    assert DriveStraight(-2.0).time_limit >= 3 * 2.0 / WALK_SPEED
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

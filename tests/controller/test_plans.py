@@ -57,7 +57,9 @@ def beside_line(plan: MotionPlan, anchor: Anchor, feet: Feet, pair: list[Leg]) -
     return float(normal @ (planned[pair, :2] - feet[pair, :2]).mean(axis=0))
 
 
-def test_above_two_feet_a_plan_is_played_over_their_line(pair: MotionPlan) -> None:
+def test_above_two_feet_a_plan_is_played_over_their_line_but_not_far_beside_it(
+    pair: MotionPlan,
+) -> None:
     feet = feet_beside(pair, 0.008)
     anchor, of_feet = anchor_of(pair, feet, FOOT_RADIUS), Anchor.of_feet(feet, FOOT_RADIUS)
     for legs in ([Leg.FR, Leg.RL], [Leg.FL, Leg.RR]):
@@ -65,11 +67,6 @@ def test_above_two_feet_a_plan_is_played_over_their_line(pair: MotionPlan) -> No
         assert beside_line(pair, anchor, feet, legs) == pytest.approx(0.0, abs=1e-9)
     assert anchor.yaw == of_feet.yaw
     assert anchor.p_world[2] == of_feet.p_world[2]
-
-
-def test_feet_far_from_their_places_move_a_plan_no_farther_than_feet_stand_beside(
-    pair: MotionPlan,
-) -> None:
     feet = feet_beside(pair, 0.2)
     moved = anchor_of(pair, feet, FOOT_RADIUS).p_world - Anchor.of_feet(feet, FOOT_RADIUS).p_world
     assert np.linalg.norm(moved) == pytest.approx(FARTHEST)
@@ -153,7 +150,7 @@ def test_the_joints_tell_the_force_of_the_ground(model: RobotModel, seed: int) -
     assert vertical_force(snapshot, NO_FRICTION) == pytest.approx(force, rel=1e-9)
 
 
-def test_what_friction_takes_is_no_force_of_the_ground(model: RobotModel) -> None:
+def test_what_the_ground_gives_is_felt_without_friction_and_in_flight(model: RobotModel) -> None:
     friction = JointFriction(dry=(0.4,) * 12)
     moving = random_state(np.random.default_rng(3))
     snapshot, force = pressed(model, moving, 1.0)
@@ -161,6 +158,16 @@ def test_what_friction_takes_is_no_force_of_the_ground(model: RobotModel) -> Non
     told = replace(snapshot.state, tau=snapshot.state.tau + asked)
     assert vertical_force(model.snapshot(told), friction) == pytest.approx(force, rel=1e-9)
     assert vertical_force(model.snapshot(told), NO_FRICTION) != pytest.approx(force, rel=1e-3)
+    weight = FeltWeight(NO_FRICTION)
+    weight.ratio = 1.3
+    target = planned(-GRAVITY, (LegTask.SWING,) * 4)
+    weight.add_to(target, model.snapshot(at_rest(2)), DT)
+    assert target.a_world[2] == pytest.approx(-GRAVITY)
+    snapshot, _ = pressed(model, at_rest(1), 0.0)
+    weight = FeltWeight(NO_FRICTION)
+    for _ in range(200):
+        weight.add_to(planned(), snapshot, DT)
+    assert weight.ratio == LEAST_WEIGHT
 
 
 @pytest.mark.parametrize("share", [0.9, 1.0, 1.15])
@@ -178,14 +185,6 @@ def test_a_plan_asks_for_the_force_that_the_felt_mass_takes(
     assert asked == pytest.approx(share * np.array([0.3, -0.2, a_z + GRAVITY]), rel=3e-3)
 
 
-def test_in_flight_nothing_is_added_to_gravity(model: RobotModel) -> None:
-    weight = FeltWeight(NO_FRICTION)
-    weight.ratio = 1.3
-    target = planned(-GRAVITY, (LegTask.SWING,) * 4)
-    weight.add_to(target, model.snapshot(at_rest(2)), DT)
-    assert target.a_world[2] == pytest.approx(-GRAVITY)
-
-
 def test_what_was_felt_before_the_first_foot_left_the_ground_stays(model: RobotModel) -> None:
     snapshot, _ = pressed(model, at_rest(1), 0.9)
     legs = [LegTask.STANCE] * 4
@@ -198,14 +197,6 @@ def test_what_was_felt_before_the_first_foot_left_the_ground_stays(model: RobotM
     for target in (planned(0.0, tuple(legs)), planned()):
         weight.add_to(target, heavier, DT)
         assert weight.ratio == felt
-
-
-def test_feet_that_carry_nothing_do_not_make_the_robot_weightless(model: RobotModel) -> None:
-    snapshot, _ = pressed(model, at_rest(1), 0.0)
-    weight = FeltWeight(NO_FRICTION)
-    for _ in range(200):
-        weight.add_to(planned(), snapshot, DT)
-    assert weight.ratio == LEAST_WEIGHT
 
 
 @pytest.mark.slow

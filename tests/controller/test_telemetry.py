@@ -33,10 +33,25 @@ def recorded(model: RobotModel, ticks: int, first: int = 0) -> Telemetry:
     return telemetry
 
 
-def test_without_a_tick_the_recording_is_empty(model: RobotModel) -> None:
+def test_a_recording_is_empty_without_a_tick_bears_silence_and_does_not_change_later(
+    model: RobotModel,
+) -> None:
     recording = Telemetry(model, CAPACITY).samples().recording()
     assert len(recording.time) == 0
     assert recording.duration == 0.0
+    telemetry = Telemetry(model, CAPACITY)
+    snapshot = model.snapshot(lying_state(1.0))
+    for _ in range(5):
+        telemetry.record(snapshot, ALL, "silent")
+    assert set(telemetry.samples().recording().time) == {1.0}
+    telemetry = recorded(model, CAPACITY)
+    recording = telemetry.samples().recording()
+    before = recording.time.copy(), recording.q.copy()
+    state = lying_state(9.0)
+    for _ in range(CAPACITY):
+        telemetry.record(model.snapshot(replace(state, q=state.q + 0.1)), ALL, "later")
+    assert np.array_equal(recording.time, before[0])
+    assert np.array_equal(recording.q, before[1])
 
 
 @pytest.mark.parametrize("ticks", [1, 2, CAPACITY - 1, CAPACITY, CAPACITY + 1, 3 * CAPACITY + 7])
@@ -64,25 +79,6 @@ def test_a_recording_may_begin_at_a_time(model: RobotModel, ticks: int) -> None:
     assert np.array_equal(part.time, whole.time[4:])
     assert np.array_equal(part.q, whole.q[4:])
     assert part.labels == whole.labels[4:]
-
-
-def test_a_plant_that_was_silent_for_some_ticks_can_be_recorded(model: RobotModel) -> None:
-    telemetry = Telemetry(model, CAPACITY)
-    snapshot = model.snapshot(lying_state(1.0))
-    for _ in range(5):
-        telemetry.record(snapshot, ALL, "silent")
-    assert set(telemetry.samples().recording().time) == {1.0}
-
-
-def test_a_recording_does_not_change_later(model: RobotModel) -> None:
-    telemetry = recorded(model, CAPACITY)
-    recording = telemetry.samples().recording()
-    before = recording.time.copy(), recording.q.copy()
-    state = lying_state(9.0)
-    for _ in range(CAPACITY):
-        telemetry.record(model.snapshot(replace(state, q=state.q + 0.1)), ALL, "later")
-    assert np.array_equal(recording.time, before[0])
-    assert np.array_equal(recording.q, before[1])
 
 
 def test_the_peaks_are_those_of_the_whole_run_as_shares_of_the_limits(model: RobotModel) -> None:

@@ -99,11 +99,14 @@ def test_the_last_key_ends_it_and_the_robot_is_limp() -> None:
         assert go2.mode is Mode.DAMPED
 
 
-def test_the_help_names_every_key_within_80_columns() -> None:
+def test_the_help_names_every_key_and_every_button_stands_for_one() -> None:
     text = keys_help()
     assert max(map(len, text.splitlines())) <= 80
     for table in (STEPS, ACTIONS):
         assert all(f"{key} {label}" in text for key, (label, _) in table.items())
+    assert set(BUTTONS.values()) <= {*ACTIONS, STOP, DAMP}
+    assert PadReading((), (0, 6, 99)).keys == "4k"
+    assert max(map(len, LEGEND.splitlines())) <= 80
 
 
 def test_without_a_terminal_it_says_so(capsys: pytest.CaptureFixture[str]) -> None:
@@ -171,22 +174,13 @@ def with_library(monkeypatch: pytest.MonkeyPatch, library: object) -> None:
     monkeypatch.setitem(sys.modules, "pygame", library)
 
 
-def test_sticks_are_a_velocity() -> None:
+def test_sticks_are_a_velocity_and_a_worn_one_asks_for_nothing() -> None:
     assert PadReading((0.0, -1.0, 0.0, 0.0)).command == VelocityCommand(AHEAD)
     assert PadReading((1.0, 0.0, 0.0, 0.0)).command == VelocityCommand(0.0, -ASIDE)
     assert PadReading((0.0, 0.0, 0.0, -1.0)).command == VelocityCommand(0.0, 0.0, TURNING)
     half = PadReading((0.0, -(1.0 + DEAD_ZONE) / 2, 0.0, 0.0)).command
     assert half.linear_x == pytest.approx(AHEAD / 2, abs=1e-3)
-
-
-def test_a_worn_stick_and_a_missing_axis_ask_for_nothing() -> None:
     assert PadReading((DEAD_ZONE, -DEAD_ZONE, 1.0)).command == ZERO_COMMAND
-
-
-def test_every_button_stands_for_a_key_that_there_is() -> None:
-    assert set(BUTTONS.values()) <= {*ACTIONS, STOP, DAMP}
-    assert PadReading((), (0, 6, 99)).keys == "4k"
-    assert max(map(len, LEGEND.splitlines())) <= 80
 
 
 def test_a_gamepad_is_found_read_and_missed_when_it_goes(monkeypatch: pytest.MonkeyPatch) -> None:

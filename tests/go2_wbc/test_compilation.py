@@ -214,7 +214,7 @@ def test_older_versions_of_a_kernel_are_not_kept_for_ever(folder: Path) -> None:
     assert len(kept(folder)) == KEPT
 
 
-def test_a_constant_that_cannot_be_told_apart_is_refused() -> None:
+def test_a_constant_or_annotation_that_compiled_code_cannot_know_is_refused() -> None:
     thing = object()
 
     @kernel
@@ -224,8 +224,6 @@ def test_a_constant_that_cannot_be_told_apart_is_refused() -> None:
     with pytest.raises(TypeError, match=r"thing = .* which cannot tell when it changes"):
         unclear(1.0)
 
-
-def test_an_annotation_that_compiled_code_does_not_know_is_refused_by_name() -> None:
     @kernel
     def odd(x: dict[str, float]) -> float:
         return x["a"]

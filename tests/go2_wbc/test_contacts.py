@@ -27,25 +27,15 @@ gaits = st.builds(Gait, st.just("some"), st.floats(0.2, 1.0), shares, offsets)
 
 
 @given(gaits)
-def test_the_events_of_a_gait_cover_its_cycle(gait: Gait) -> None:
+def test_the_events_of_a_gait_cover_its_cycle_and_its_feet_their_duty(gait: Gait) -> None:
     schedule = gait.schedule()
     assert schedule.times[0] == 0.0
     assert all(a < b for a, b in itertools.pairwise(schedule.times))
     assert schedule.times[-1] < gait.period
     assert schedule.period == gait.period
-
-
-@given(gaits)
-def test_each_foot_stands_for_its_duty_share_of_the_period(gait: Gait) -> None:
-    schedule = gait.schedule()
     lengths = np.diff([*schedule.times, gait.period])
     np.testing.assert_allclose(lengths @ schedule.modes, gait.stance_time, atol=ROUNDING)
     assert gait.stance_time + gait.swing_time == pytest.approx(gait.period)
-
-
-@given(gaits)
-def test_each_foot_touches_down_at_its_offset_and_lifts_after_the_duty(gait: Gait) -> None:
-    schedule = gait.schedule()
     for leg in LEGS:
         touchdown = gait.offsets[leg] * gait.period
         assert not schedule.at(touchdown + gait.period - BESIDE).stance[leg]
@@ -99,14 +89,11 @@ def test_a_time_that_falls_short_of_an_event_by_rounding_counts_as_the_event(ear
         np.testing.assert_allclose(phase.remaining, 0.18, atol=2 * TIE)
 
 
-def test_a_time_clearly_before_an_event_does_not() -> None:
+def test_an_event_is_met_by_a_time_that_falls_short_by_rounding_only() -> None:
     schedule = GAITS["trot"].schedule()
     for event in (0.18, 0.36, 3.6):
         old = schedule.at(event - 3 * TIE).stance
         np.testing.assert_array_equal(old, ~schedule.at(event).stance)
-
-
-def test_summed_control_periods_meet_every_event_of_a_minute_on_the_tick() -> None:
     gait = GAITS["trot"]
     schedule, ticks = gait.schedule(), round(gait.period / 2 / TICK)
     time = 0.0
@@ -117,13 +104,22 @@ def test_summed_control_periods_meet_every_event_of_a_minute_on_the_tick() -> No
         time += TICK
 
 
-def test_standing_never_changes() -> None:
+def test_standing_never_changes_nor_does_a_schedule_by_what_it_hands_out() -> None:
     for t in (-1.0, 0.0, 1e6):
         phase = standing().at(t)
         assert phase.stance.all()
         assert np.isinf(phase.elapsed).all()
         assert np.isinf(phase.remaining).all()
         assert not phase.progress.any()
+    schedule = standing()
+    schedule.at(0.0).stance[:] = False
+    assert schedule.at(0.0).stance.all()
+    # Only a gait comes back to its start; a schedule without period does not.
+    modes = np.ones((2, 4), dtype=bool)
+    modes[1, 1] = False
+    phase = ContactSchedule((0.0, 1.0), modes).at(0.25)
+    assert np.isinf(phase.elapsed).all()
+    assert phase.remaining[1] == 0.75
 
 
 @pytest.fixture
@@ -133,7 +129,7 @@ def lift_of_fr() -> ContactSchedule:
     return ContactSchedule((0.0, 1.0, 3.0), modes)
 
 
-def test_a_schedule_without_period_holds_its_first_and_last_mode(
+def test_without_period_the_first_and_last_mode_are_held_without_end(
     lift_of_fr: ContactSchedule,
 ) -> None:
     for t, up in ((-5.0, False), (0.0, False), (0.999, False), (1.0, True), (2.999, True)):
@@ -141,11 +137,6 @@ def test_a_schedule_without_period_holds_its_first_and_last_mode(
     for t in (3.0, 100.0):
         assert lift_of_fr.at(t).stance.all()
     assert all(lift_of_fr.at(t).stance[[0, 2, 3]].all() for t in (0.0, 2.0, 4.0))
-
-
-def test_without_period_the_time_before_the_first_and_after_the_last_change_is_endless(
-    lift_of_fr: ContactSchedule,
-) -> None:
     before, during, after = (lift_of_fr.at(t) for t in (0.25, 1.5, 4.0))
     assert (before.elapsed[1], before.remaining[1]) == (np.inf, 0.75)
     assert (during.elapsed[1], during.remaining[1]) == (0.5, 1.5)
@@ -155,21 +146,6 @@ def test_without_period_the_time_before_the_first_and_after_the_last_change_is_e
     for phase in (before, during, after):
         assert np.isinf(phase.elapsed[[0, 2, 3]]).all()
         assert np.isinf(phase.remaining[[0, 2, 3]]).all()
-
-
-def test_the_mode_at_the_end_is_no_change_at_the_start() -> None:
-    """Only a gait comes back to its start; a schedule without period does not."""
-    modes = np.ones((2, 4), dtype=bool)
-    modes[1, 1] = False
-    phase = ContactSchedule((0.0, 1.0), modes).at(0.25)
-    assert np.isinf(phase.elapsed).all()
-    assert phase.remaining[1] == 0.75
-
-
-def test_a_phase_that_was_handed_out_cannot_change_the_schedule() -> None:
-    schedule = standing()
-    schedule.at(0.0).stance[:] = False
-    assert schedule.at(0.0).stance.all()
 
 
 @pytest.mark.parametrize(
@@ -182,9 +158,12 @@ def test_events_out_of_order_are_refused(times: tuple[float, ...], rows: int) ->
         ContactSchedule(times, np.ones((rows, 4), dtype=bool))
 
 
-def test_an_unknown_gait_is_answered_with_the_known_names() -> None:
+def test_a_gait_is_found_by_its_name_or_is_itself_and_an_unknown_one_told_the_known() -> None:
     with pytest.raises(CommandError, match=r"unknown gait 'moonwalk'; valid: .*trot"):
         find_gait("moonwalk")
+    mine = replace(GAITS["trot"], name="mine")
+    assert find_gait("trot") is GAITS["trot"]
+    assert find_gait(mine) is mine
 
 
 @pytest.mark.parametrize(
@@ -254,9 +233,3 @@ def test_a_narrow_gait_places_its_feet_nearer_to_the_middle_and_no_farther_back(
     np.testing.assert_allclose(narrow[:, 1], feet[:, 1] / 2)
     np.testing.assert_array_equal(narrow[:, ::2], feet[:, ::2])
     np.testing.assert_array_equal(GAITS["trot"].placed(feet), feet)
-
-
-def test_a_gait_is_found_by_its_name_or_is_itself() -> None:
-    mine = replace(GAITS["trot"], name="mine")
-    assert find_gait("trot") is GAITS["trot"]
-    assert find_gait(mine) is mine

@@ -55,11 +55,8 @@ def test_the_drawn_tree_is_the_real_tree() -> None:
     assert drawn_tree() == real
 
 
-def test_a_wrong_command_is_also_a_value_error() -> None:
+def test_errors_say_what_they_hold() -> None:
     assert issubclass(CommandError, ValueError)
-
-
-def test_an_infeasible_qp_prints_its_residual_table() -> None:
     error = QpInfeasible("daqp", "status -1", ROWS)
     head, *table = str(error).splitlines()
     assert head == "daqp found no solution of the whole-body QP (status -1)"
@@ -67,13 +64,7 @@ def test_an_infeasible_qp_prints_its_residual_table() -> None:
     assert "torque limits" in table[0]
     assert "3.25" in table[0]
     assert (error.solver, error.status, error.residuals) == ("daqp", "status -1", ROWS)
-
-
-def test_an_ik_error_keeps_its_residuals() -> None:
     assert IkError("missed", list(ROWS)).residuals == ROWS
-
-
-def test_an_infeasible_motion_lists_every_finding() -> None:
     error = MotionInfeasible("bow", ["calf beyond its limit", "margin -2 cm"])
     assert str(error).splitlines() == [
         "motion 'bow' is infeasible:",
@@ -83,16 +74,13 @@ def test_an_infeasible_motion_lists_every_finding() -> None:
     assert error.findings == ("calf beyond its limit", "margin -2 cm")
 
 
-def test_an_unknown_name_is_answered_with_the_sorted_valid_ones() -> None:
+def test_an_unknown_name_is_answered_with_the_valid_ones_and_advice_if_one_is_like_it() -> None:
     assert unknown_name("gait", "run", ("walk", "trot")) == "unknown gait 'run'; valid: trot, walk"
     nearly = unknown_name("gait", "tort", ("walk", "trot"))
     assert nearly == "unknown gait 'tort'; valid: trot, walk; did you mean 'trot'?"
+    assert unknown_name("foot", "XX", LEG_NAMES) == "unknown foot 'XX'; valid: FL, FR, RL, RR"
 
 
 @pytest.mark.parametrize(("foot", "meant"), [("LF", "FL"), ("rl", "RL"), ("RF", "FR")])
 def test_letters_in_another_order_or_case_are_recognised(foot: str, meant: str) -> None:
     assert unknown_name("foot", foot, LEG_NAMES).endswith(f"; did you mean {meant!r}?")
-
-
-def test_what_is_like_no_name_gets_no_advice() -> None:
-    assert unknown_name("foot", "XX", LEG_NAMES) == "unknown foot 'XX'; valid: FL, FR, RL, RR"

@@ -9,16 +9,19 @@ from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 
 
-def test_a_folder_with_the_name_of_the_file_is_refused(tmp_path: Path) -> None:
+def test_a_file_is_replaced_whole_in_folders_that_are_made_and_none_is_a_folder(
+    tmp_path: Path,
+) -> None:
     (tmp_path / "demo.html").mkdir()
     with pytest.raises(ConfigError, match="a folder has this name"):
         checked_output(tmp_path / "demo.html", (".html",))
-
-
-def test_missing_folders_are_made_and_the_suffix_may_be_in_capitals(tmp_path: Path) -> None:
     target = checked_output(tmp_path / "a" / "b" / "demo.HTML", (".html",))
     assert target.parent.is_dir()
     assert list(target.parent.iterdir()) == []
+    target.write_text("old and much longer than the new one")
+    assert write_atomically(target, b"new") == target
+    assert target.read_bytes() == b"new"
+    assert list(target.parent.iterdir()) == [target]
 
 
 def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
@@ -34,12 +37,4 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
     with pytest.raises(ConfigError, match="No space left"):
         write_atomically(target, b"new")
     assert target.read_text() == "old"
-    assert list(tmp_path.iterdir()) == [target]
-
-
-def test_a_written_file_replaces_the_old_one_whole(tmp_path: Path) -> None:
-    target = tmp_path / "demo.html"
-    target.write_text("old and much longer than the new one")
-    assert write_atomically(target, b"new") == target
-    assert target.read_bytes() == b"new"
     assert list(tmp_path.iterdir()) == [target]

@@ -40,26 +40,20 @@ def test_the_margin_of_a_square_is_the_distance_to_its_border(
     assert support_margin(SQUARE, np.array(p)) == pytest.approx(margin, abs=ROUNDING)
 
 
-def test_the_incentre_of_the_3_4_5_triangle_is_1_from_every_edge() -> None:
+def test_the_incentre_is_1_from_every_edge_and_points_on_edges_are_no_corners() -> None:
     assert support_margin(RIGHT_TRIANGLE, np.array([1.0, 1.0])) == pytest.approx(1.0)
+    points = np.concatenate([SQUARE, [[0.0, 0.0], [1.0, 0.0], [0.3, -0.2]], SQUARE])
+    hull = convex_hull(points)
+    assert {tuple(corner) for corner in hull} == {tuple(corner) for corner in SQUARE}
+    assert area(hull) == pytest.approx(4.0)
+    with pytest.raises(ValueError, match="at least one point"):
+        support_margin(np.zeros((0, 2)), np.zeros(2))
 
 
 @pytest.mark.parametrize("points", [[[2.0, 0.0]], [[-1.0, 0.0], [1.0, 0.0], [0.0, 0.0]]])
 def test_nothing_is_inside_a_hull_without_area(points: list[list[float]]) -> None:
     assert support_margin(np.array(points), np.array([1.0, 0.0])) <= 0.0
     assert support_margin(np.array(points), np.array([2.0, 3.0])) < -2.9
-
-
-def test_no_point_at_all_is_refused() -> None:
-    with pytest.raises(ValueError, match="at least one point"):
-        support_margin(np.zeros((0, 2)), np.zeros(2))
-
-
-def test_points_inside_and_on_edges_are_no_corners() -> None:
-    points = np.concatenate([SQUARE, [[0.0, 0.0], [1.0, 0.0], [0.3, -0.2]], SQUARE])
-    hull = convex_hull(points)
-    assert {tuple(corner) for corner in hull} == {tuple(corner) for corner in SQUARE}
-    assert area(hull) == pytest.approx(4.0)
 
 
 @given(clouds)
@@ -69,18 +63,12 @@ def test_a_hull_runs_counter_clockwise_around_every_point(points: np.ndarray) ->
     assert all(support_margin(points, p) >= -ROUNDING for p in points)
 
 
-@given(clouds, places, places)
-def test_the_margin_never_changes_faster_than_the_point_moves(
-    points: np.ndarray, p: np.ndarray, q: np.ndarray
+@given(clouds, places, places, places)
+def test_the_margin_grows_with_feet_and_never_faster_than_the_point_moves(
+    points: np.ndarray, p: np.ndarray, q: np.ndarray, extra: np.ndarray
 ) -> None:
     change = abs(support_margin(points, p) - support_margin(points, q))
     assert change <= np.linalg.norm(p - q) + ROUNDING
-
-
-@given(clouds, places, places)
-def test_another_foot_never_makes_the_margin_smaller(
-    points: np.ndarray, extra: np.ndarray, p: np.ndarray
-) -> None:
     more = np.concatenate([points, extra[None]])
     assert support_margin(more, p) >= support_margin(points, p) - ROUNDING
 

@@ -8,7 +8,7 @@ from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 
 
-def test_the_joints_are_in_pinocchios_order() -> None:
+def test_the_legs_columns_tile_the_joints_in_pinocchios_order() -> None:
     urdf = find_description().urdf_path
     robot = pin.buildModelFromUrdf(str(urdf), pin.JointModelFreeFlyer())
     assert list(robot.names)[2:] == list(JOINT_NAMES)
@@ -17,16 +17,13 @@ def test_the_joints_are_in_pinocchios_order() -> None:
         assert all(name.startswith(leg.name) for name in names)
         columns = [robot.joints[robot.getJointId(name)].idx_v for name in names]
         assert columns == list(range(18))[leg.velocities]
-
-
-def test_the_legs_columns_tile_the_joints_without_gap_or_overlap() -> None:
     joints = np.concatenate([np.arange(12)[leg.joints] for leg in LEGS])
     velocities = np.concatenate([np.arange(18)[leg.velocities] for leg in LEGS])
     np.testing.assert_array_equal(joints, np.arange(12))
     np.testing.assert_array_equal(velocities, np.arange(6, 18))
 
 
-def test_side_front_and_foot_name_say_where_the_hip_is() -> None:
+def test_a_legs_name_says_where_its_hip_is_and_its_mirror_is_across() -> None:
     model = RobotModel()
     for leg in LEGS:
         x, y, _ = model.p_base_hips[leg]
@@ -34,9 +31,6 @@ def test_side_front_and_foot_name_say_where_the_hip_is() -> None:
         assert (x > 0) == leg.is_front
         assert FOOT_NAMES[leg] == leg.foot == f"{leg.name}_foot"
         assert model.pin_model.existFrame(leg.foot)
-
-
-def test_the_mirror_of_a_leg_is_across_and_comes_back() -> None:
     for leg in LEGS:
         assert leg.mirror.side == -leg.side
         assert leg.mirror.is_front == leg.is_front

@@ -44,18 +44,21 @@ def test_a_part_has_these_samples_of_every_field(
     assert part.duration == pytest.approx(0.2)
 
 
-def test_a_part_without_a_sample_is_empty(recording: Recording) -> None:
+def test_labels_become_spans_a_part_may_be_empty_and_all_is_a_table_for_pandas(
+    recording: Recording,
+) -> None:
     part = recording.part(slice(5, None))
     assert len(part.time) == 0
     assert part.labels == ()
     assert part.duration == 0.0
-
-
-def test_equal_labels_become_one_span_and_spans_leave_no_gap(recording: Recording) -> None:
     spans = recording.spans()
     assert [span.label for span in spans] == ["stand", "bow", "stand"]
     assert [span.start for span in spans] == pytest.approx([0.0, 0.2, 0.4])
     assert [span.end for span in spans] == pytest.approx([0.2, 0.4, 0.4])
+    table = pytest.importorskip("pandas") and recording.to_dataframe()
+    assert list(table.columns[:3]) == ["time", "label", "q0"]
+    assert table["stance3"].tolist() == recording.stance[:, 3].tolist()
+    assert table.shape == (5, 2 + 19 + 18 + 12 + 4 + 4 + 3 + 1)
 
 
 def test_a_recording_is_saved_and_loaded_whole(recording: Recording, tmp_path: Path) -> None:
@@ -73,10 +76,3 @@ def test_a_file_that_is_no_recording_is_told_so(content: bytes | None, tmp_path:
         path.write_bytes(content)
     with pytest.raises(ConfigError, match=r"run.npz is missing, damaged, or no recording"):
         Recording.load(path)
-
-
-def test_a_recording_is_a_table_for_pandas(recording: Recording) -> None:
-    table = pytest.importorskip("pandas") and recording.to_dataframe()
-    assert list(table.columns[:3]) == ["time", "label", "q0"]
-    assert table["stance3"].tolist() == recording.stance[:, 3].tolist()
-    assert table.shape == (5, 2 + 19 + 18 + 12 + 4 + 4 + 3 + 1)

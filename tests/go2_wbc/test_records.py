@@ -53,7 +53,7 @@ def drive(cart: Cart, c: Numbers) -> bool:
     return cart.is_loaded and not cart.spare.turns > 0.0
 
 
-def test_the_parts_of_a_record_are_places_in_its_row() -> None:
+def test_the_parts_of_a_record_are_places_in_its_row_for_compiled_code_too() -> None:
     cart = Cart(time=1.5, axes=np.arange(6.0).reshape(2, 3))
     cart.wheels[1].place[:] = 7.0, 8.0, 9.0
     cart.is_loaded = True
@@ -61,9 +61,6 @@ def test_the_parts_of_a_record_are_places_in_its_row() -> None:
     assert cart.row.tolist() == [1.5, 1, *range(6), *[0.0] * 4, 7.0, 8.0, 9.0, 0.0, *[0.0] * 3, 3.0]
     assert cart.is_loaded is True
     assert Cart.of(cart.row).spare.turns == 3.0
-
-
-def test_compiled_code_knows_the_same_places() -> None:
     carts = [Cart(time=1.5, axes=np.arange(6.0).reshape(2, 3)) for _ in range(2)]
     numbers = packed(Numbers())
     compiled, written = drive(carts[0], numbers), plain(drive)(carts[1], numbers)
@@ -73,16 +70,13 @@ def test_compiled_code_knows_the_same_places() -> None:
     assert carts[0].spare.place[2] == 1.0
 
 
-def test_a_packed_dataclass_is_the_same_value() -> None:
+def test_a_packed_dataclass_is_the_same_value_and_a_copy_has_its_own() -> None:
     numbers = packed(Numbers(mass=6.0))
     assert isinstance(numbers, Numbers)
     assert (numbers.mass, numbers.gains.kd) == (6.0, 4.0)
     assert [*numbers.gains.kp] == [1.0, 2.0, 3.0]
     with pytest.raises(AttributeError):
         numbers.mass = 7.0  # type: ignore[misc]
-
-
-def test_a_copy_has_numbers_of_its_own() -> None:
     cart = Cart(time=1.0)
     for other in (copy.deepcopy(cart), pickle.loads(pickle.dumps(cart))):
         assert isinstance(other, Cart)
@@ -90,7 +84,7 @@ def test_a_copy_has_numbers_of_its_own() -> None:
     assert cart.time == 1.0
 
 
-def test_a_part_that_is_not_there_is_refused_by_name() -> None:
+def test_what_a_record_has_not_or_cannot_hold_is_refused_by_name() -> None:
     cart = Cart()
     with pytest.raises(AttributeError, match="Cart has no part 'tme'"):
         cart.tme = 1.0
@@ -98,6 +92,12 @@ def test_a_part_that_is_not_there_is_refused_by_name() -> None:
         Cart(tme=1.0)
     with pytest.raises(AttributeError):
         cart.axes = np.zeros((2, 3))  # compiled code could not exchange it either
+
+    class Counted(Record):
+        steps: Int[np.ndarray, "3"]
+
+    with pytest.raises(TypeError, match=r"Counted\.steps is declared as .*no row of numbers holds"):
+        Counted()
 
 
 @pytest.mark.parametrize(
@@ -113,23 +113,12 @@ def test_what_does_not_fit_is_refused_by_name(values: dict[str, object], told: s
         Cart(**values)
 
 
-def test_a_part_that_no_row_holds_is_refused_by_name() -> None:
-    class Counted(Record):
-        steps: Int[np.ndarray, "3"]
-
-    with pytest.raises(TypeError, match=r"Counted\.steps is declared as .*no row of numbers holds"):
-        Counted()
-
-
-def test_a_number_is_told_by_its_name() -> None:
+def test_a_number_is_told_by_its_name_and_all_in_a_line() -> None:
     layout = layout_of(Cart)
     assert layout.place(0) == ("time", "")
     assert layout.place(layout.slice("axes").start + 4) == ("axes", "[1, 1]")
     assert layout.place(layout.slice("wheels").start + 6) == ("wheels[1].place", "[2]")
     assert layout.place(layout.size - 1) == ("spare.turns", "")
-
-
-def test_what_a_record_prints_fits_a_line() -> None:
     said = repr(Cart(time=0.25))
     assert said.startswith("Cart(time=0.25, is_loaded=False, axes=<2 x 3>")
     assert "spare=Wheel(place=(0, 0, 0), turns=0)" in said

@@ -78,9 +78,12 @@ def test_placing_leaves_legs_joints_and_force_bounds_alone() -> None:
         np.testing.assert_array_equal(getattr(placed, name), getattr(REFERENCE, name))
 
 
-def test_stance_names_the_legs_that_stand() -> None:
+def test_stance_names_the_legs_that_stand_and_the_row_holds_the_planned_forces() -> None:
     np.testing.assert_array_equal(REFERENCE.stance, [True, False, False, True])
     assert REFERENCE.legs[1] is LegTask.SWING
+    again = Reference.of_row(REFERENCE.row)
+    assert again.force_weight == REFERENCE.force_weight
+    np.testing.assert_array_equal(again.f_world_feet, REFERENCE.f_world_feet)
 
 
 @given(anchors)
@@ -115,12 +118,6 @@ def test_a_weight_of_planned_forces_that_costs_accuracy_is_refused(weight: float
 def test_a_number_below_zero_is_refused(name: str) -> None:
     with pytest.raises(CommandError, match=rf"{name} must be 0 or more, got -0\.1"):
         _ = replace(REFERENCE, **{name: -0.1}).row
-
-
-def test_the_row_of_a_reference_holds_its_planned_forces() -> None:
-    again = Reference.of_row(REFERENCE.row)
-    assert again.force_weight == REFERENCE.force_weight
-    np.testing.assert_array_equal(again.f_world_feet, REFERENCE.f_world_feet)
 
 
 def test_sag_is_measured_at_what_is_tracked_and_lean_between_the_verticals() -> None:

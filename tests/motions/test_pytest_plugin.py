@@ -65,7 +65,9 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_every_motion_of_a_file_is_a_test_and_a_failure_is_no_traceback(folder: Path) -> None:
+def test_every_motion_of_a_file_or_folder_is_a_test_and_a_failure_is_no_traceback(
+    folder: Path,
+) -> None:
     done = run_pytest(folder, "mine.py")
     assert done.returncode == 1
     assert "PASSED mine.py::good" in done.stdout
@@ -74,9 +76,6 @@ def test_every_motion_of_a_file_is_a_test_and_a_failure_is_no_traceback(folder: 
     assert "typo (mine.py, line 17): TypeError" in done.stdout
     assert "Traceback" not in done.stdout
     assert "2 failed, 1 passed" in done.stdout
-
-
-def test_a_folder_of_motions_is_collected_beside_the_tests(folder: Path) -> None:
     (folder / "more").mkdir()
     (folder / "more" / "one.py").write_text(MOTIONS.split("@motion\ndef too_far")[0])
     done = run_pytest(folder, "--motions", "more", "-q")

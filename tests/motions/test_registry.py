@@ -22,14 +22,11 @@ def written(folder: Path, text: str, name: str = "mine.py") -> Path:
     return file
 
 
-def test_the_motions_of_a_file_come_by_name(tmp_path: Path) -> None:
+def test_the_motions_of_a_file_come_by_name_also_after_it_was_changed(tmp_path: Path) -> None:
     found = load_file(written(tmp_path, HEAD + NOD + NOD.replace("nod", "shake")))
     assert list(found) == ["nod", "shake"]
     assert found["nod"].source.endswith("mine.py:4")
     assert found["nod"]().end == 1.0
-
-
-def test_motions_that_a_file_imports_are_not_its_own(tmp_path: Path) -> None:
     text = (
         HEAD
         + "from motions.library.trunk import bow\n\n\n"
@@ -37,12 +34,20 @@ def test_motions_that_a_file_imports_are_not_its_own(tmp_path: Path) -> None:
         + "\n\nagain = nod\nother = bow\n"
     )
     assert list(load_file(written(tmp_path, text))) == ["nod"]
+    file = written(tmp_path, HEAD + NOD)
+    assert load_file(file)["nod"]().end == 1.0
+    written(tmp_path, HEAD + NOD.replace("over=1.0", "over=2.5"))
+    assert load_file(file)["nod"]().end == 2.5
 
 
-def test_two_motions_of_one_name_are_refused_with_both_lines(tmp_path: Path) -> None:
+def test_two_motions_of_one_name_and_what_is_no_file_are_refused(tmp_path: Path) -> None:
     file = written(tmp_path, HEAD + NOD + "\n\n" + NOD)
     with pytest.raises(TimelineError, match=r"two motions named 'nod', lines 5 and 10"):
         load_file(file)
+    with pytest.raises(TimelineError, match="there is no file"):
+        load_file(tmp_path / "none.py")
+    with pytest.raises(TimelineError, match=r"must end in \.py"):
+        load_file(written(tmp_path, "hello", "mine.txt"))
 
 
 @pytest.mark.parametrize(
@@ -60,20 +65,6 @@ def test_a_file_that_does_not_load_is_named_with_the_line(
 ) -> None:
     with pytest.raises(TimelineError, match=message):
         load_file(written(tmp_path, text))
-
-
-def test_a_missing_file_and_another_kind_of_file_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(TimelineError, match="there is no file"):
-        load_file(tmp_path / "none.py")
-    with pytest.raises(TimelineError, match=r"must end in \.py"):
-        load_file(written(tmp_path, "hello", "mine.txt"))
-
-
-def test_a_file_may_be_loaded_again_after_it_was_changed(tmp_path: Path) -> None:
-    file = written(tmp_path, HEAD + NOD)
-    assert load_file(file)["nod"]().end == 1.0
-    written(tmp_path, HEAD + NOD.replace("over=1.0", "over=2.5"))
-    assert load_file(file)["nod"]().end == 2.5
 
 
 def test_a_file_that_is_saved_twice_in_a_second_is_read_anew(

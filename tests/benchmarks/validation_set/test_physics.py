@@ -52,9 +52,15 @@ def plan() -> MotionPlan:
     return compile_timeline(Timeline().body(z=-0.03, over=0.8).home(over=0.8), RobotModel())
 
 
-def test_nothing_is_held_against_a_clean_run(plan: MotionPlan) -> None:
+def test_what_goes_wrong_counts_by_the_definitions_that_look_at_it(plan: MotionPlan) -> None:
     found = verdicts_of(CLEAN, plan)
     assert found == MotionFailures((), (), (), ())
+    found = verdicts_of(replace(CLEAN, stopped=0.3, joint_distance=-0.001), plan)
+    assert (found.strict, found.stops) == ((), ("on a stop 300 ms",))
+    found = verdicts_of(replace(CLEAN, fall="fell at t=3.20 s"), plan)
+    assert found.strict == found.stops == found.lenient == found.fell == ("fell",)
+    unplanned = replace(plan, problems=(Problem("dynamic plan", "trunk", 0.0),))  # type: ignore[type-var]
+    assert verdicts_of(CLEAN, unplanned).strict == (UNPLANNED,)
 
 
 @pytest.mark.parametrize(
@@ -83,25 +89,10 @@ def test_what_physics_shows_is_said_in_words(
     assert not found.fell
 
 
-def test_a_joint_on_its_stop_counts_where_stops_are_counted(plan: MotionPlan) -> None:
-    found = verdicts_of(replace(CLEAN, stopped=0.3, joint_distance=-0.001), plan)
-    assert (found.strict, found.stops) == ((), ("on a stop 300 ms",))
-
-
-def test_a_fall_counts_by_every_definition(plan: MotionPlan) -> None:
-    found = verdicts_of(replace(CLEAN, fall="fell at t=3.20 s"), plan)
-    assert found.strict == found.stops == found.lenient == found.fell == ("fell",)
-
-
 def test_a_place_out_of_reach_counts_although_the_leg_follows_its_plan() -> None:
     line = Timeline(name="too high").foot("FR", x=0.1, z=1.0, over=1.5).home(over=1.5)
     (harm,) = verdicts_of(CLEAN, compile_timeline(line, RobotModel())).strict
     assert harm.startswith("paw")
-
-
-def test_what_was_asked_of_a_solver_and_not_planned_is_not_done(plan: MotionPlan) -> None:
-    unplanned = replace(plan, problems=(Problem("dynamic plan", "trunk", 0.0),))  # type: ignore[type-var]
-    assert verdicts_of(CLEAN, unplanned).strict == (UNPLANNED,)
 
 
 @pytest.mark.parametrize(("name", "is_done"), [("crouch", True), ("two_feet_at_once", False)])
@@ -168,23 +159,18 @@ def test_a_border_is_searched_for_its_own_draw_from_amplitude_1(
 KEPT: dict[str, float | None] = {"crouch 0": 1.25, "rise 0": None}
 
 
-def test_borders_are_read_as_they_were_written(tmp_path: Path) -> None:
+def test_borders_are_those_of_the_exam_as_they_were_written_and_a_damaged_file_is_told(
+    tmp_path: Path,
+) -> None:
     file = tmp_path / "borders.json"
     write_borders(KEPT, file)
     assert read_borders(file) == KEPT
     assert len(file.read_text().splitlines()) == 2 + len(KEPT), "one entry a line"
-
-
-def test_a_damaged_file_is_an_error_that_says_what_to_do(tmp_path: Path) -> None:
-    file = tmp_path / "borders.json"
     file.write_text("{")
     with pytest.raises(ConfigError, match="--borders"):
         read_borders(file)
     with pytest.raises(ConfigError, match="cannot be read"):
         read_borders(tmp_path / "none.json")
-
-
-def test_the_borders_that_are_kept_are_those_of_the_exam() -> None:
     kept = read_borders()
     assert set(kept) <= {draw_name(family, number) for family, number in draws()}
     for question in questions(kept):

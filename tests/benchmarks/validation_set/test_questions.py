@@ -52,23 +52,17 @@ def test_an_amplitude_scales_what_is_drawn_and_draws_nothing_else() -> None:
     assert [key.start for key in small.keys] == [key.start for key in large.keys]
 
 
-def test_there_are_enough_motions_and_enough_of_them_are_dynamic() -> None:
+def test_families_are_many_and_lie_in_halves_that_no_other_one_changes() -> None:
     asked = questions(all_borders())
     assert len(asked) >= LEAST
     for stratum in STRATA:
         assert sum(q.stratum == stratum for q in asked) >= 0.31 * len(asked)
     assert sum(q.family.is_dynamic for q in asked) >= LEAST_DYNAMIC
     assert len({q.name for q in asked}) == len(asked)
-
-
-def test_a_family_lies_in_one_half_and_both_halves_hold_a_third_of_all_at_least() -> None:
     for is_dynamic in (False, True):
         halves = [f.half for f in FAMILIES.values() if f.is_dynamic is is_dynamic]
         assert set(halves) == {TRAIN, TEST}
         assert min(halves.count(TRAIN), halves.count(TEST)) >= len(halves) / 3
-
-
-def test_adding_a_family_moves_no_other_one_to_another_half() -> None:
     halves = {name: family.half for name, family in FAMILIES.items()}
     assert (halves["crouch"], halves["lean_aside"]) == (TEST, TEST)
     assert (halves["roll_and_back"], halves["jump_up"]) == (TRAIN, TRAIN)

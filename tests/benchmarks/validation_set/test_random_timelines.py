@@ -19,16 +19,13 @@ from motions import Timeline
 from motions.language.keys import BodyKey
 
 
-def test_a_sentence_is_the_same_every_time_and_grows() -> None:
+def test_a_sentence_is_the_same_every_time_and_grows_in_amplitudes_and_times_only() -> None:
     for number in range(30):
         sizes = list(sizes_of(number))
         assert [one.step for one in sizes] == list(range(len(FACTORS)))
         assert [one.line.keys for one in sizes] == [one.line.keys for one in sizes_of(number)]
         for one, next_one in pairwise(sizes):
             assert (one.amplitude, one.pace) < (next_one.amplitude, next_one.pace)
-
-
-def test_a_size_changes_amplitudes_and_times_only() -> None:
     small, large = RandomTimeline(3, 0, 0.5, 1.0).line, RandomTimeline(3, 1, 1.0, 2.0).line
     kinds = [[type(key) for key in line.keys] for line in (small, large)]
     assert kinds[0] == kinds[1]

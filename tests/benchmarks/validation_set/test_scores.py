@@ -25,14 +25,11 @@ CASES = [
 ]
 
 
-def test_refusals_and_passes_are_judged_in_both_directions() -> None:
+def test_refusals_and_passes_are_judged_in_both_directions_by_each_definition() -> None:
     score = Score.of(CASES)
     assert [(share.right, share.n) for share in score] == [(3, 4), (3, 5), (4, 6), (4, 5)]
     assert score.least == pytest.approx(0.6)
     assert score.n == len(CASES)
-
-
-def test_each_definition_of_the_outcome_is_judged_by_itself() -> None:
     cases = [case(True, True), case(True, True, why="fell")]
     assert Score.of(cases, STRICT).refused_right == Share(2, 2)
     assert Score.of(cases, LENIENT).refused_right == Share(0, 2)
@@ -47,25 +44,19 @@ def test_the_interval_is_the_one_of_wilson() -> None:
     assert Share(0, 0).interval == (0.0, 1.0)
 
 
-def test_the_table_has_both_halves_and_fits_a_terminal() -> None:
+def test_the_table_has_both_halves_what_has_no_plan_and_what_play_noticed() -> None:
     cases = [*CASES, *(case(True, True, half=TRAIN) for _ in range(100))]
     table = render(cases)
     assert max(map(len, table.splitlines())) <= 80
     assert "test strict" in table
     assert "slip" in table
     assert scores(cases)["train strict"].n == 100
-
-
-def test_motions_without_a_plan_are_counted_apart() -> None:
     cases = [
         Case("a", TEST, "easy", True, ("dynamic plan",), MotionFailures((UNPLANNED,), (), (), ())),
         Case("b", TEST, "easy", True, (), MotionFailures((), (), (), ())),
     ]
     found = scores(cases)
     assert (found["test dynamic"].n, found["test solved"].n) == (2, 1)
-
-
-def test_it_is_told_how_often_play_noticed_what_went_wrong() -> None:
     told = replace(case(False, True), outcome=MotionFailures((NOT_DONE, "fell"), (), (), ()))
     unplanned = replace(case(True, True), outcome=MotionFailures((UNPLANNED,), (), (), ()))
     said = render([told, case(True, True), case(False, False), unplanned]).splitlines()[-1]

@@ -25,7 +25,9 @@ def song(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return clicks.save(tmp_path / "song.wav")
 
 
-def test_a_dance_is_played_on_the_beats_and_measured(song: Path, run: Run) -> None:
+def test_a_dance_is_played_and_measured_or_told_and_unknown_moves_are_refused(
+    song: Path, run: Run
+) -> None:
     told = json.loads(run("dance", song, "--seed", "3", "--json").out)
     assert told["ok"]
     assert told["tempo"] == BPM
@@ -33,6 +35,12 @@ def test_a_dance_is_played_on_the_beats_and_measured(song: Path, run: Run) -> No
     assert len(told["accents"]) >= len(told["moves"])
     assert told["on_beat"] == 1.0
     assert max(abs(accent["late_ms"]) for accent in told["accents"]) < 40.0
+    text = run("dance", song, "--no-play", "--moves", "nod", "sway", "tap_FR").out
+    assert all(word in text for word in ("96 a minute, bars of 3", "feasible, not played", "nod"))
+    assert "twist" not in text
+    assert "accents" not in json.loads(run("dance", song, "--no-play", "--json").out)
+    said = run("dance", song, "--moves", "moonwalk", code=ExitCode.USAGE)
+    assert "unknown move 'moonwalk'; valid: bob" in said.err
 
 
 def test_the_page_of_a_dance_has_its_beats_and_its_music(
@@ -51,18 +59,6 @@ def test_the_page_of_a_dance_has_its_beats_and_its_music(
     path = tmp_path / "again.mp3"
     path.write_bytes(arrays["sound"].tobytes())
     assert len(read_sound(path)) == pytest.approx(SECONDS * RATE, abs=1)
-
-
-def test_without_playing_the_moves_and_their_times_are_told(song: Path, run: Run) -> None:
-    text = run("dance", song, "--no-play", "--moves", "nod", "sway", "tap_FR").out
-    assert all(word in text for word in ("96 a minute, bars of 3", "feasible, not played", "nod"))
-    assert "twist" not in text
-    assert "accents" not in json.loads(run("dance", song, "--no-play", "--json").out)
-
-
-def test_an_unknown_move_is_said_with_those_that_there_are(song: Path, run: Run) -> None:
-    said = run("dance", song, "--moves", "moonwalk", code=ExitCode.USAGE)
-    assert "unknown move 'moonwalk'; valid: bob" in said.err
 
 
 def test_without_the_extra_the_install_line_is_said(

@@ -160,9 +160,16 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     return seen
 
 
-def test_options_reach_plant_controller_and_engine(
+def test_options_reach_plant_controller_and_engine_and_without_any_it_starts_exactly(
     tmp_path: Path, seen: dict[str, Any], run: Run
 ) -> None:
+    run("demo", "--no-media", "--out", tmp_path)
+    assert seen["initial_joint_noise"] == 0.0
+    assert (seen["terrain"], seen["lidar"], seen["sensors"]) == (None, False, "ideal")
+    assert (seen["realtime"], seen["viewer"]) == (False, False)
+    run("demo", "--no-media", "--out", tmp_path, "--terrain", "stairs", code=ExitCode.FAILED)
+    assert isinstance(seen["terrain"], Stairs)
+    assert (seen["lidar"], seen["sensors"]) == (True, "imu")
     file = tmp_path / "mine.toml"
     file.write_text("[locomotion]\nheight = 0.27\n", encoding="utf-8")
     options = "--seed 3 --friction 0.4 --mass-scale 1.2 --realtime --backend full --solver proxqp"
@@ -173,23 +180,6 @@ def test_options_reach_plant_controller_and_engine(
     assert (seen["realtime"], seen["viewer"], seen["mjcf"]) == (True, False, None)
     assert isinstance(config, Config)
     assert (config.backend, config.wbc.solver, config.locomotion.height) == ("full", "proxqp", 0.27)
-
-
-def test_over_a_terrain_it_has_its_own_sensors_and_a_lidar(
-    tmp_path: Path, seen: dict[str, Any], run: Run
-) -> None:
-    run("demo", "--no-media", "--out", tmp_path, "--terrain", "stairs", code=ExitCode.FAILED)
-    assert isinstance(seen["terrain"], Stairs)
-    assert (seen["lidar"], seen["sensors"]) == (True, "imu")
-
-
-def test_without_options_the_robot_starts_exactly_headless_and_as_fast_as_the_cpu(
-    tmp_path: Path, seen: dict[str, Any], run: Run
-) -> None:
-    run("demo", "--no-media", "--out", tmp_path)
-    assert seen["initial_joint_noise"] == 0.0
-    assert (seen["terrain"], seen["lidar"], seen["sensors"]) == (None, False, "ideal")
-    assert (seen["realtime"], seen["viewer"]) == (False, False)
 
 
 def test_the_choices_are_those_of_the_engine() -> None:
@@ -236,16 +226,13 @@ def test_the_filmstrip_shows_sitting_swinging_and_the_raised_paw() -> None:
     assert stance[rows[2]].tolist() == [True, False, True, True]
 
 
-def test_of_a_walk_over_a_terrain_the_filmstrip_shows_three_moments() -> None:
+def test_the_filmstrip_of_a_terrain_shows_three_moments_and_of_no_walk_what_it_chooses() -> None:
     go2 = FakeGo2()
     report = run_demo(go2)
     forward = replace(report.steps[3], name="cross")
     times = demo.filmstrip_times(replace(report, steps=(forward,)), go2.recording())
     start = forward.start - go2.recording().time[0]
     assert times == pytest.approx([start + 0.5, start + 1.0, start + 1.5])
-
-
-def test_a_run_without_these_moments_leaves_the_choice_to_the_filmstrip() -> None:
     go2 = FakeGo2(falls_in="walk")
     assert demo.filmstrip_times(run_demo(go2), go2.recording()) is None
 
@@ -299,22 +286,16 @@ def test_the_table_fits_80_columns_whatever_happens() -> None:
             assert max(map(len, lines)) <= COLUMNS
 
 
-def test_the_table_marks_every_step_and_gives_the_reason_of_a_failure() -> None:
+def test_the_table_marks_every_step_beside_what_was_measured_with_a_dash_for_nothing() -> None:
     report = run_demo(FakeGo2(refusals={"high_five": "the paw was not held at 0.62 m"}))
     text = render(report, "utf-8")
     assert text.count("✓") == 7
     assert text.count("✗") == 1
     assert "\n     the paw was not held at 0.62 m\n" in text
     assert "7 of 8 steps done." in text
-
-
-def test_asked_and_measured_stand_side_by_side_with_their_unit() -> None:
     text = render(run_demo(FakeGo2(speed_share=0.95)), "utf-8")
     row = next(line for line in text.splitlines() if "mean speed" in line)
     assert row.split()[-3:] == ["0.200", "0.190", "m/s"]
-
-
-def test_what_could_not_be_measured_is_a_dash() -> None:
     text = render(report_of(), "utf-8")
     assert "nan" not in text
     assert "least support margin   -" in text
@@ -332,23 +313,7 @@ def test_a_terminal_without_ticks_gets_words(encoding: str | None) -> None:
 # --- the progress line --------------------------------------------------------------------------
 
 
-def test_on_a_terminal_progress_is_one_line_in_place(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("COLUMNS", "40")
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    with ProgressLine() as line:
-        line.update(0.5, "x" * 100)
-        line.done("one piece")
-    text = capsys.readouterr().err
-    assert "\n" not in text
-    assert "one piece" not in text
-    shown = text.split("\x1b[2K")[1].rstrip("\r")
-    assert len(shown) < 40
-    assert text.endswith("\r\x1b[2K")
-
-
-def test_while_something_is_solved_the_line_says_how_far_that_is(
+def test_on_a_terminal_progress_is_one_line_in_place_that_tells_of_solving(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
@@ -361,6 +326,17 @@ def test_while_something_is_solved_the_line_says_how_far_that_is(
         f"{progress_bar(0.5)} checking sway: solving, iteration {n}, cost 1.23e+03"
         for n in (1, 6, 11)
     ]
+    monkeypatch.setenv("COLUMNS", "40")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    with ProgressLine() as line:
+        line.update(0.5, "x" * 100)
+        line.done("one piece")
+    text = capsys.readouterr().err
+    assert "\n" not in text
+    assert "one piece" not in text
+    shown = text.split("\x1b[2K")[1].rstrip("\r")
+    assert len(shown) < 40
+    assert text.endswith("\r\x1b[2K")
 
 
 def test_of_what_a_search_says_the_first_answer_stays_on_a_terminal(

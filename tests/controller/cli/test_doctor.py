@@ -80,9 +80,10 @@ def test_version_bounds_are_compared_by_number(version: str, bounds: str, fits: 
     assert doctor.satisfies(version, bounds) is fits
 
 
-def test_requirements_are_read_without_extras() -> None:
+def test_requirements_are_read_without_extras_and_are_none_of_what_is_absent() -> None:
     rows = ["placo<0.11,>=0.10.2", "pin", "x[y]>=1 ; python_version>'3'", "ruff; extra == 'dev'"]
     assert doctor.parse_requirements(rows) == {"placo": "<0.11,>=0.10.2", "pin": "", "x": ">=1"}
+    assert doctor.requirements_of("no-such-distribution-anywhere") == {}
 
 
 @pytest.mark.parametrize("is_installed", [True, False])
@@ -100,10 +101,6 @@ def test_every_library_that_the_project_asks_for_is_known(
 
     monkeypatch.setattr(importlib.metadata, "requires", requires)
     assert set(doctor.requirements_of(PROGRAM)) == set(doctor.parse_requirements(rows)) > {"coal"}
-
-
-def test_the_requirements_of_an_absent_package_are_empty() -> None:
-    assert doctor.requirements_of("no-such-distribution-anywhere") == {}
 
 
 # --- illnesses ----------------------------------------------------------------------------------
@@ -233,15 +230,14 @@ def test_the_verdict_and_the_exit_code_follow_the_problems(
     assert run("doctor", code=code).out.splitlines()[-1] == verdict
 
 
-def test_json_says_the_same(monkeypatch: pytest.MonkeyPatch, run: Run) -> None:
+def test_json_says_the_same_and_lines_to_type_never_wrap(
+    monkeypatch: pytest.MonkeyPatch, run: Run
+) -> None:
     monkeypatch.setattr(doctor, "examine", lambda: [HEALTHY, ILL])
     report = json.loads(run("doctor", "--json", code=ExitCode.FAILED).out)
     assert report["ok"] is False
     assert [item["status"] for item in report["findings"]] == ["ok", "problem"]
     assert report["findings"][1]["remedy"] == ILL.remedy
-
-
-def test_long_details_wrap_at_80_columns_and_lines_to_type_never() -> None:
     line = "python -m pip install " + "x" * 90
     text = doctor.render([Finding("A", "b", Status.PROBLEM, "word " * 40, line)])
     assert f"-> {line}" in text

@@ -124,11 +124,8 @@ def test_a_command_that_cannot_be_imported_does_not_stop_the_others(
     assert "go2-wbc doctor" in run("broken", code=ExitCode.RUNTIME).err
 
 
-def test_version_is_printed(run: Run) -> None:
+def test_without_a_command_there_is_the_help_and_the_version_if_it_is_asked_for(run: Run) -> None:
     assert run("--version").out.startswith("go2-wbc ")
-
-
-def test_no_command_shows_the_help_as_a_usage_error(run: Run) -> None:
     assert "usage: go2-wbc" in run(code=USAGE).err
 
 

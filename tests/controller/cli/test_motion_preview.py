@@ -81,13 +81,10 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(
     assert f"cannot write {target}" in said.err
 
 
-def test_several_motions_are_refused(rise: Path, run: Run) -> None:
+def test_several_motions_and_a_port_in_use_are_refused(rise: Path, run: Run) -> None:
     rise.write_text(GOOD + GOOD.replace("rise", "second"), encoding="utf-8")
     said = run("preview", rise, "--no-open", code=ExitCode.USAGE)
     assert "choose FILE.py:NAME: rise, second" in said.err
-
-
-def test_a_port_in_use_is_named(run: Run) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         said = run("preview", "bow", "--no-open", "--port", port, code=ExitCode.USAGE)

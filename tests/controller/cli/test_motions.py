@@ -64,12 +64,9 @@ def clumsy(tmp_path: Path) -> Path:
     return path
 
 
-def test_without_a_word_the_whole_library_is_meant_and_with_one_that_motion() -> None:
+def test_what_is_listed_is_the_library_with_its_parameters(run: Run) -> None:
     assert [line.name for line in meant([], [])] == list(motion_names())
     assert [line.name for line in meant(["bow"], [])] == ["bow"]
-
-
-def test_the_list_names_every_motion_with_its_parameters(run: Run) -> None:
     text = run("list").out
     assert all(name in text for name in motion_names())
     assert "--set hold=2 (0.5 to 30 s)" in text
@@ -101,9 +98,13 @@ def test_check_says_what_would_make_a_motion_feasible(tmp_path: Path, run: Run) 
     assert {one["kind"] for one in report["suggestions"]} == {"tempo", "amplitude"}
 
 
-def test_a_world_is_asked_for_by_its_friction_and_payload(run: Run) -> None:
+def test_a_world_is_asked_for_by_its_friction_and_payload_and_what_cannot_stand_there_is_told(
+    run: Run,
+) -> None:
     said = run("check", "wiggle", "--friction", 0.05, "--payload", 2, code=ExitCode.FAILED)
     assert "That holds for friction 0.05, payload 2 kg." in said.out
+    said = run("run", "bow", "--friction", 0.0001, "--force", code=ExitCode.RUNTIME)
+    assert "the robot did not get ready: fell at t=" in said.err
 
 
 def test_the_numbers_of_a_file_count_in_a_check(tmp_path: Path, run: Run) -> None:
@@ -162,11 +163,6 @@ def test_a_motion_is_played_in_the_world_that_it_is_checked_for(
     monkeypatch.setattr("go2_wbc.plant.plant_in_world", plant)
     run("run", "bow", *options, code=ExitCode.RUNTIME)
     assert [(world.friction, world.payload) for world in worlds] == [(friction, payload)]
-
-
-def test_a_robot_that_cannot_get_up_is_a_message(run: Run) -> None:
-    said = run("run", "bow", "--friction", 0.0001, "--force", code=ExitCode.RUNTIME)
-    assert "the robot did not get ready: fell at t=" in said.err
 
 
 def test_export_writes_the_same_trajectory_as_csv_and_npz(tmp_path: Path, run: Run) -> None:

@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from controller.cli.common import ExitCode
+from controller.cli.common import ExitCode, ProgressLine
+from controller.cli.sweep import tell
 from controller.sweeps import read_sweep
+from controller.sweeps.run import Progress
 from tests.controller.cli.conftest import Run
 from tests.controller.sweeps import swept
 
@@ -35,6 +37,18 @@ def test_the_summary_fits_and_the_rows_are_kept(sweep: Run) -> None:
     (file,) = Path("out/sweeps").glob("*.sqlite")
     assert f"rows: {file}" in told.out
     assert len(read_sweep(file).rows) == 12
+
+
+def test_on_its_way_a_sweep_tells_twenty_times_how_long_the_rest_will_take(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with ProgressLine() as line:
+        for done in range(401):
+            tell(line, Progress(done, 400, 1.0 if done else 0.0))
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == 20
+    assert told[0] == "20/400, 1 a second, 6.3 min left"
+    assert told[13:15] == ["280/400, 1 a second, 2.0 min left", "300/400, 1 a second, 100 s left"]
 
 
 def test_json_has_the_same_for_a_program(sweep: Run) -> None:

@@ -14,7 +14,13 @@ import pytest
 from controller import Certificate, certify, sweep
 from controller.cli.common import ExitCode
 from controller.report_view import planned
-from controller.sweeps.certify import certified_rate, read_certificate, with_certificate
+from controller.sweeps.certify import (
+    FEWEST,
+    _narrow,
+    certified_rate,
+    read_certificate,
+    with_certificate,
+)
 from controller.sweeps.motion_study import world_of
 from controller.sweeps.sweep_file import Row
 from go2_wbc import World
@@ -105,6 +111,9 @@ def test_a_sweep_ends_with_the_fewest_first_rows_that_are_enough(tmp_path: Path)
         assert [row["seed"] for row in found.rows] == list(range(7))  # 0, 3 and 6 are ok
     again = sweep(swept.trial, 40, out=tmp_path / "3.sqlite", is_enough=is_enough)
     assert len(again.rows) == 7
+    certain: list[Row] = [{"done": True}] * FEWEST  # of all done, the interval is 0.168 wide
+    assert not _narrow(0.2)(certain[1:])
+    assert (_narrow(0.16)(certain), _narrow(0.17)(certain)) == (False, True)
 
 
 def test_a_page_shows_the_certificate_and_whether_it_holds(bows: Certificate) -> None:

@@ -59,7 +59,7 @@ def test_a_word_stands_for_a_function_of_a_module_or_file(tmp_path: Path) -> Non
     assert known(of_file.rows) == known(expected(3))
 
 
-def test_more_seeds_than_before_only_add_to_it(out: Path) -> None:
+def test_more_seeds_add_to_what_is_there_fewer_take_of_it_and_fresh_begins_anew(out: Path) -> None:
     sweep(swept.process, 4, workers=1, out=out)
     told: list[Progress] = []
     first = read_sweep(out).rows
@@ -68,18 +68,12 @@ def test_more_seeds_than_before_only_add_to_it(out: Path) -> None:
     assert {row["pid"] for row in later.rows[4:]}.isdisjoint(row["pid"] for row in first)
     assert [progress.done for progress in told] == [4, 5, 6]
     assert (told[0].rate, told[0].share, told[-1].remaining) == (0.0, 4 / 6, 0.0)
-
-
-def test_fewer_seeds_than_before_give_those_asked_for(out: Path) -> None:
-    sweep(swept.trial, 6, workers=1, out=out)
+    sweep(swept.trial, 6, workers=1, out=out, fresh=True)
     again = sweep(swept.trial, 2, first_seed=3, workers=1, out=out)
     assert [row["seed"] for row in again.rows] == [3, 4]
-
-
-def test_fresh_begins_anew(out: Path) -> None:
-    first = sweep(swept.process, 2, workers=1, out=out)
+    process = sweep(swept.process, 2, workers=1, out=out, fresh=True)
     again = sweep(swept.process, 2, workers=1, out=out, fresh=True)
-    assert first.rows[0]["pid"] != again.rows[0]["pid"]
+    assert process.rows[0]["pid"] != again.rows[0]["pid"]
 
 
 def test_fresh_removes_no_file_that_is_something_else(tmp_path: Path) -> None:
@@ -153,18 +147,15 @@ def test_a_worker_that_dies_once_costs_nothing(
     assert known(result.rows) == known(expected(8))
 
 
-def test_what_a_function_prints_does_not_get_into_its_rows(out: Path) -> None:
+def test_what_a_function_prints_or_gives_that_is_no_row_is_kept_out(out: Path) -> None:
     assert known(sweep(swept.talk, 5, workers=1, out=out).rows) == known(expected(5))
+    with pytest.raises(SweepError, match="must return a dict"):
+        sweep(swept.no_row, 3, workers=1, out=out, fresh=True)
 
 
 def test_workers_have_one_thread_for_blas_and_one_order_of_sets(out: Path) -> None:
     (row,) = sweep(swept.threads, 1, workers=1, out=out).rows
     assert (row["blas"], row["hash"]) == ("1", "0")
-
-
-def test_what_is_no_row_ends_the_sweep(out: Path) -> None:
-    with pytest.raises(SweepError, match="must return a dict"):
-        sweep(swept.no_row, 3, workers=1, out=out)
 
 
 def running(command: list[str]) -> subprocess.Popen[bytes]:

@@ -47,7 +47,7 @@ def test_floats_come_back_bit_by_bit(tmp_path: Path) -> None:
             assert bits(float(row["minus"])) == bits(-value)
 
 
-def test_rows_come_back_by_seed_with_their_kinds(file: Path) -> None:
+def test_rows_come_back_by_seed_with_their_kinds_and_are_kept_once(file: Path) -> None:
     with SweepFile(file, ABOUT) as rows:
         assert rows.rows() == [{"seed": 2, **ROW}, {"seed": 7, **ROW}]
         assert rows.rows([7]) == [{"seed": 7, **ROW}]
@@ -56,9 +56,6 @@ def test_rows_come_back_by_seed_with_their_kinds(file: Path) -> None:
         assert rows.finished == {2, 7}
         assert rows.failures == {3: "it fell"}
         assert rows.about == ABOUT
-
-
-def test_a_row_is_kept_once_and_ends_a_failure(file: Path) -> None:
     with SweepFile(file, ABOUT) as rows:
         rows.add(7, {**ROW, "x": 99.0})
         rows.add(3, ROW)
@@ -113,15 +110,12 @@ def test_what_holds_something_else_is_refused_and_untouched(
     assert file.read_bytes() == before
 
 
-def test_what_is_no_database_is_refused_and_untouched(tmp_path: Path) -> None:
+def test_what_is_no_database_or_not_there_is_refused_and_untouched(tmp_path: Path) -> None:
     file = tmp_path / "letter.db"
     file.write_text("Dear reader, " * 100)
     with pytest.raises(ConfigError, match="is no database of a sweep"):
         SweepFile(file, ABOUT)
     assert file.read_text().startswith("Dear reader")
-
-
-def test_a_file_must_be_there_to_be_read_and_have_its_ending(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="there is no file"):
         SweepFile(tmp_path / "none.sqlite")
     with pytest.raises(ConfigError, match=r"valid: \.sqlite, \.db"):
@@ -156,11 +150,14 @@ def test_what_was_killed_while_it_began_is_begun_again(tmp_path: Path) -> None:
         assert rows.finished == {0}
 
 
-def test_numbers_of_numpy_become_those_of_python_to_the_last_bit() -> None:
+def test_numbers_and_words_become_those_of_python() -> None:
     given = {"a": np.float64(0.1), "b": np.float32(0.1), "c": np.int16(3), "d": np.bool_(True)}
     row = row_of(given)
     assert row == {"a": 0.1, "b": float(np.float32(0.1)), "c": 3, "d": True}
     assert columns_of(row) == {"a": "float", "b": "float", "c": "int", "d": "bool"}
+    assert row_of({"a": "x\ud800"}) == {"a": "x?"}
+    whole, other = {"a": 1}, {"a": math.pi}
+    assert joined(columns_of(whole), other) == joined(columns_of(other), whole) == {"a": "float"}
 
 
 @pytest.mark.parametrize(
@@ -183,15 +180,6 @@ def test_numbers_of_numpy_become_those_of_python_to_the_last_bit() -> None:
 def test_what_is_no_row_is_refused_with_what_is_wrong(given: object, message: str) -> None:
     with pytest.raises(SweepError, match=message):
         row_of(given)
-
-
-def test_half_of_a_surrogate_pair_becomes_text() -> None:
-    assert row_of({"a": "x\ud800"}) == {"a": "x?"}
-
-
-def test_whole_numbers_among_others_become_floats_in_either_order() -> None:
-    whole, other = {"a": 1}, {"a": math.pi}
-    assert joined(columns_of(whole), other) == joined(columns_of(other), whole) == {"a": "float"}
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import json
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from controller import sweep
@@ -32,7 +33,7 @@ from tests.controller.sweeps import swept
 from tests.viz.page_reader import read_data
 
 
-def test_trials_draw_inside_their_ranges_and_fill_them() -> None:
+def test_a_trial_is_drawn_by_its_seed_inside_its_ranges() -> None:
     trials = [Trial(seed) for seed in range(200)]
     for values, (low, high) in (
         ([t.friction for t in trials], FRICTION_RANGE),
@@ -41,21 +42,14 @@ def test_trials_draw_inside_their_ranges_and_fill_them() -> None:
     ):
         assert low <= min(values) < low + 0.05 * (high - low)
         assert high - 0.05 * (high - low) < max(values) <= high
-
-
-def test_a_trial_is_decided_by_its_seed() -> None:
+    each = np.corrcoef([(t.friction, t.mass_scale, t.initial_yaw) for t in trials], rowvar=False)
+    assert np.abs(each - np.eye(3)).max() < 0.3
     a, b, other = Trial(5), Trial(5), Trial(6)
     assert (a.friction, a.mass_scale, a.initial_yaw) == (b.friction, b.mass_scale, b.initial_yaw)
     assert a.mass_scale != other.mass_scale
-
-
-def test_nominal_friction_changes_nothing_else() -> None:
     drawn, nominal = Trial(3), Trial(3, has_nominal_friction=True)
     assert nominal.friction == NOMINAL_FRICTION
     assert (nominal.mass_scale, nominal.initial_yaw) == (drawn.mass_scale, drawn.initial_yaw)
-
-
-def test_the_plant_of_a_trial_is_what_the_trial_says() -> None:
     nominal_mass = 16.085
     trial = Trial(4)
     plant = trial.plant()

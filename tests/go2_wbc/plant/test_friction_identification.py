@@ -96,43 +96,32 @@ def test_what_is_uncertain_of_the_viscous_friction_is_not_fed_forward() -> None:
     np.testing.assert_allclose(found.feed_forward.viscous, [0.6, 0.0] * 6)
 
 
-def test_friction_that_is_no_straight_line_is_refused_by_name() -> None:
+def test_what_is_no_friction_or_cannot_be_measured_is_refused_by_name() -> None:
     friction = 0.2 + 0.1 * SPEEDS
     friction[5] = [1.0, 0.2, 1.5, 0.1]
     with pytest.raises(PlantError, match=r"FR_calf_joint is no sum of a dry and a viscous part"):
         fitted(SPEEDS, friction)
-
-
-def test_friction_that_drives_a_joint_is_refused() -> None:
     friction = np.full((12, 4), 0.2)
     friction[7] = -1.0
     with pytest.raises(PlantError, match=r"dry friction of RL_thigh_joint .* -1\.000, below 0"):
         fitted(SPEEDS, friction)
-
-
-def test_a_robot_that_stands_is_refused() -> None:
     plant = MujocoPlant()
     stand_up(plant)
     with pytest.raises(PlantError, match="lay the robot on its belly"):
         identify_friction(plant)
+    with pytest.raises(PlantTimeout, match="clock stands still"):
+        identify_friction(Doctored(lambda state: replace(state, time=0.0)))
 
 
-def test_a_foot_that_touches_is_named_and_the_robot_left_limp() -> None:
+def test_a_foot_that_touches_and_a_plant_without_torques_are_refused() -> None:
     def touching(state: RobotState) -> RobotState:
         return replace(state, feet_in_contact=np.array([False, False, True, False]))
 
     with pytest.raises(PlantError, match="RL_foot must be in the air"):
         identify_friction(Doctored(touching))
 
-
-def test_a_plant_without_torque_measurement_is_refused() -> None:
     def without_torque(state: RobotState) -> RobotState:
         return replace(state, tau=np.zeros(12))
 
     with pytest.raises(PlantError, match="does not say what torques"):
         identify_friction(Doctored(without_torque))
-
-
-def test_a_clock_that_stands_still_ends_it() -> None:
-    with pytest.raises(PlantTimeout, match="clock stands still"):
-        identify_friction(Doctored(lambda state: replace(state, time=0.0)))

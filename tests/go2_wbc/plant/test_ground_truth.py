@@ -42,17 +42,13 @@ def test_recording_changes_nothing_for_the_controller() -> None:
     assert recorded.control_period == bare.control_period
 
 
-def test_a_cleared_recording_begins_with_the_present_state() -> None:
+def test_a_recording_begins_with_the_present_state_or_at_a_time() -> None:
     truth = GroundTruth(MujocoPlant())
     for _ in range(TICKS):
         truth.write(SERVO)
     truth.clear()
     assert truth.recording().time.tolist() == [truth.start]
     assert truth.start == truth.read().time
-
-
-def test_a_recording_may_begin_at_a_time() -> None:
-    truth = GroundTruth(MujocoPlant())
     for _ in range(TICKS):
         truth.write(SERVO)
     whole, middle = truth.recording(), 0.5 * TICKS * truth.control_period
@@ -100,26 +96,31 @@ def test_a_robot_on_its_trunk_or_its_back_has_fallen(roll: float, said: str) -> 
     assert said in str(truth.fall())
 
 
-def test_a_standing_robot_has_not_fallen() -> None:
+def test_a_standing_robot_has_not_fallen_and_one_that_is_not_finite_has(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     plant = MujocoPlant()
     q = np.concatenate([[0.0, 0.0, 0.34, 0.0, 0.0, 0.0, 1.0], STAND])
     plant.place(q, np.zeros(18))
     assert GroundTruth(plant).fall() is None
-
-
-def test_a_state_that_is_not_finite_is_a_fall(monkeypatch: pytest.MonkeyPatch) -> None:
-    plant = MujocoPlant()
-    truth, state = GroundTruth(plant), plant.read()
+    truth, state = GroundTruth(plant), plant.truth()
     broken = replace(state, q=np.where(np.arange(19) == 2, math.nan, state.q))
-    monkeypatch.setattr(plant, "read", lambda: broken)
+    monkeypatch.setattr(plant, "truth", lambda: broken)
     assert truth.fall() is not None
 
 
-def test_a_recording_gives_the_velocity_in_the_frame_of_the_heading() -> None:
+def test_a_recording_has_its_velocity_by_heading_torques_by_motor_and_parts_in_step() -> None:
     recorded = empty_recording(11, np.zeros((11, 4, 3)))
     recorded.rpy[:, 2] = math.pi / 2
     recorded.p_world_com[:, :2] = recorded.time[:, None] * [0.2, 0.5]  # y is ahead, -x is left
     assert recorded.com_velocity == pytest.approx(np.tile([0.5, -0.2, 0.0], (10, 1)))
+    recorded = empty_recording(10, np.zeros((10, 4, 3)))
+    assert recorded.since(0.0041).time == pytest.approx(0.002 * np.arange(3, 10))
+    part = recorded.part(slice(2, 5))
+    assert {len(getattr(part, name)) for name in part.__slots__} == {3}
+    flags = np.array([1, 0, 1, 1, 0, 1], dtype=bool)
+    assert true_runs(flags) == [slice(0, 1), slice(2, 4), slice(5, 6)]
+    assert true_runs(np.zeros(3, dtype=bool)) == []
 
 
 def test_shares_and_distances_are_those_of_the_worst_joint() -> None:
@@ -156,16 +157,3 @@ def test_what_a_command_asks_for_is_recorded_beside_what_the_motors_gave() -> No
     lower, upper = model.motor.limits(before.joint_velocities)
     np.testing.assert_array_equal(recorded.tau[1], np.clip(asked, lower, upper))
     assert recorded.asked_shares(model)[1] > 2.0
-
-
-def test_part_and_since_keep_every_column_in_step() -> None:
-    recorded = empty_recording(10, np.zeros((10, 4, 3)))
-    assert recorded.since(0.0041).time == pytest.approx(0.002 * np.arange(3, 10))
-    part = recorded.part(slice(2, 5))
-    assert {len(getattr(part, name)) for name in part.__slots__} == {3}
-
-
-def test_runs_are_where_flags_are_true_without_a_gap() -> None:
-    flags = np.array([1, 0, 1, 1, 0, 1], dtype=bool)
-    assert true_runs(flags) == [slice(0, 1), slice(2, 4), slice(5, 6)]
-    assert true_runs(np.zeros(3, dtype=bool)) == []

@@ -41,16 +41,13 @@ def test_encoders_read_in_steps() -> None:
     assert not np.array_equal(q, plant.truth().q[7:])
 
 
-def test_its_world_begins_where_it_lies() -> None:
+def test_its_world_begins_where_it_lies_and_anew_where_it_is_placed() -> None:
     plant = MujocoPlant(sensors="imu", initial_yaw=2.0, errors=SensorErrors(**NONE))
     state = plant.read()
     assert state.q[:2] == pytest.approx([0.0, 0.0], abs=1e-6)
     assert state.yaw == pytest.approx(0.0, abs=1e-3)
     assert plant.truth().yaw == pytest.approx(2.0, abs=0.05)
     assert state.rpy[:2] == pytest.approx(plant.truth().rpy[:2], abs=0.01)
-
-
-def test_placed_elsewhere_it_begins_anew() -> None:
     plant = MujocoPlant(sensors="imu")
     q = plant.truth().q
     q[:3] += [1.0, 2.0, 0.0]

@@ -17,7 +17,7 @@ CLOSE = 1e-9
 """kg, m, kg m^2: one model computed twice."""
 
 
-def test_mass_matrix_and_gravity_are_those_of_the_loaded_robot_model() -> None:
+def test_masses_friction_and_joints_are_those_that_are_stated() -> None:
     plant = plant_in_world(LOADED)
     model = RobotModel(world=LOADED)
     assert plant.total_mass == pytest.approx(model.mass, abs=CLOSE)
@@ -31,9 +31,6 @@ def test_mass_matrix_and_gravity_are_those_of_the_loaded_robot_model() -> None:
         mujoco.mj_fullM(plant.model, plant.data, M)
         joints = model.snapshot(plant.read()).mass_matrix[6:, 6:]
         assert M[6:, 6:] == pytest.approx(joints, abs=CLOSE)
-
-
-def test_friction_and_joints_are_those_that_are_stated() -> None:
     plant, usual = plant_in_world(LOADED), MujocoPlant()
     assert plant.model.geom("FL_foot").friction[0] == LOADED.friction
     for name in ("dof_damping", "dof_frictionloss"):

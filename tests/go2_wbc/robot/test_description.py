@@ -27,31 +27,29 @@ def written(tmp_path: Path, text: str, name: str = "my_go2.urdf") -> Path:
     return path
 
 
-def test_the_installed_description_has_real_files_and_the_published_limits() -> None:
+def test_the_installed_description_has_real_files_limits_and_adjacent_links() -> None:
     found = find_description()
     assert found.urdf_path.is_file()
     assert found.srdf_path is not None
     assert found.srdf_path.is_file()
     assert found.efforts == EFFORTS
     assert found.speeds == SPEEDS
+    pairs = find_description().disabled_pairs
+    assert len(pairs) == SRDF_PAIRS
+    assert ("base", "FL_thigh") in pairs
 
 
-def test_every_mesh_of_the_urdf_resolves_to_a_file() -> None:
+def test_every_mesh_of_the_urdf_resolves_to_a_file_and_a_missing_one_is_named(
+    tmp_path: Path,
+) -> None:
     found = find_description()
     names = {mesh.get("filename", "") for mesh in ET.fromstring(installed_urdf()).iter("mesh")}
     assert len(names) > 10
     assert all(found.mesh_path(name).is_file() for name in names)
-
-
-def test_a_missing_mesh_is_named_with_the_places_tried() -> None:
     with pytest.raises(DescriptionError, match=r"nowhere\.stl.*tried /"):
         find_description().mesh_path("package://go2/nowhere.stl")
-
-
-def test_the_srdf_disables_the_adjacent_links() -> None:
-    pairs = find_description().disabled_pairs
-    assert len(pairs) == SRDF_PAIRS
-    assert ("base", "FL_thigh") in pairs
+    with pytest.raises(DescriptionError, match=r"nowhere\.dae"):
+        read_mesh(tmp_path / "nowhere.dae")
 
 
 def test_without_the_wheel_the_message_says_what_to_install(
@@ -62,7 +60,7 @@ def test_without_the_wheel_the_message_says_what_to_install(
         find_description()
 
 
-def test_a_users_urdf_is_taken_with_the_installed_srdf_and_meshes(tmp_path: Path) -> None:
+def test_a_users_urdf_is_taken_with_the_installed_srdf_or_its_own(tmp_path: Path) -> None:
     path = written(tmp_path, installed_urdf().replace("45.43", "40.0"))
     found = find_description(path)
     assert found.urdf_path == path
@@ -70,18 +68,20 @@ def test_a_users_urdf_is_taken_with_the_installed_srdf_and_meshes(tmp_path: Path
     assert len(found.disabled_pairs) == SRDF_PAIRS
     mesh = "package://example-robot-data/robots/go2_description/collisions/base_convex.stl"
     assert found.mesh_path(mesh).is_file()
-
-
-def test_a_users_own_srdf_beside_the_urdf_wins(tmp_path: Path) -> None:
     path = written(tmp_path, installed_urdf())
     pair = '<disable_collisions link1="FL_foot" link2="FR_foot"/>'
     written(tmp_path, f"<robot name='x'>{pair}</robot>", "my_go2.srdf")
     assert find_description(path).disabled_pairs == (("FL_foot", "FR_foot"),)
 
 
-def test_a_missing_urdf_is_refused_with_its_path(tmp_path: Path) -> None:
+def test_a_missing_or_broken_file_and_a_joint_without_effort_are_refused(tmp_path: Path) -> None:
     with pytest.raises(DescriptionError, match=r"nothing\.urdf: No such file"):
         find_description(tmp_path / "nothing.urdf")
+    with pytest.raises(DescriptionError, match="not a valid SRDF"):
+        parse_disabled_pairs(written(tmp_path, "<robot", "broken.srdf"))
+    text = installed_urdf().replace('effort="45.43"', "", 1)
+    with pytest.raises(DescriptionError, match="FL_calf_joint has no valid effort limit"):
+        find_description(written(tmp_path, text))
 
 
 @pytest.mark.parametrize(
@@ -97,18 +97,10 @@ def test_a_broken_urdf_is_refused_with_the_reason(tmp_path: Path, text: str, rea
         find_description(written(tmp_path, text))
 
 
-def test_a_broken_srdf_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(DescriptionError, match="not a valid SRDF"):
-        parse_disabled_pairs(written(tmp_path, "<robot", "broken.srdf"))
-
-
-def test_another_robot_is_refused_with_every_name_it_lacks(tmp_path: Path) -> None:
+def test_another_robot_is_refused_with_every_name_that_it_lacks(tmp_path: Path) -> None:
     with pytest.raises(DescriptionError) as caught:
         find_description(written(tmp_path, "<robot name='other'><link name='base'/></robot>"))
     assert all(name in str(caught.value) for name in (*JOINT_NAMES, *FOOT_NAMES))
-
-
-def test_only_the_missing_names_are_listed(tmp_path: Path) -> None:
     text = installed_urdf().replace('"RR_calf_joint"', '"rr_knee"')
     with pytest.raises(DescriptionError) as caught:
         find_description(written(tmp_path, text))
@@ -116,29 +108,15 @@ def test_only_the_missing_names_are_listed(tmp_path: Path) -> None:
     assert "FL_hip_joint" not in str(caught.value)
 
 
-def test_a_joint_without_an_effort_limit_is_refused(tmp_path: Path) -> None:
-    text = installed_urdf().replace('effort="45.43"', "", 1)
-    with pytest.raises(DescriptionError, match="FL_calf_joint has no valid effort limit"):
-        find_description(written(tmp_path, text))
-
-
 # --- mesh files: every colour one part
 
 
-def test_the_feet_are_one_black_part() -> None:
+def test_colours_come_from_materials_and_grey_is_the_rest(tmp_path: Path) -> None:
     name = "package://example-robot-data/robots/go2_description/visuals/foot.dae"
     (part,) = read_mesh(find_description().mesh_path(name))
     assert part.rgba == (0.0, 0.0, 0.0, 1.0)
     assert part.triangles.max() == len(part.points) - 1
-
-
-def test_a_mesh_without_a_material_is_grey(tmp_path: Path) -> None:
     trimesh.creation.box((1.0, 2.0, 3.0)).export(tmp_path / "box.stl")
     (part,) = read_mesh(tmp_path / "box.stl")
     assert len(part.triangles) == 12
     assert part.rgba == pytest.approx((0.67, 0.69, 0.77, 1.0), abs=0.01)
-
-
-def test_a_missing_mesh_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(DescriptionError, match=r"nowhere\.dae"):
-        read_mesh(tmp_path / "nowhere.dae")

@@ -59,15 +59,12 @@ def test_which_command_has_acted_is_known_in_each_tick() -> None:
         latency.note(asked[tick], STILL)
 
 
-def test_torques_that_do_not_change_tell_nothing() -> None:
+def test_what_does_not_change_or_does_not_obey_tells_nothing() -> None:
     latency, rng = Latency(PERIOD), np.random.default_rng(3)
     asked = jagged(rng, 500)
     followed(latency, np.vstack([asked, np.tile(asked[-1], (500, 1))]), 4, noise=0.02)
     assert latency.delay == pytest.approx(4 * PERIOD)
-
-
-def test_motors_that_do_not_obey_tell_nothing() -> None:
-    """A robot that lay still whatever it was told was taken to move at 0.5 m/s."""
+    # A robot that lay still whatever it was told was taken to move at 0.5 m/s.
     latency, rng = Latency(PERIOD), np.random.default_rng(8)
     state = helpers.state_of(helpers.standing_q())
     for tau in 10.0 + jagged(rng, 500, step=0.1):
@@ -76,13 +73,10 @@ def test_motors_that_do_not_obey_tell_nothing() -> None:
     assert latency.delay == 0.0
 
 
-def test_a_state_is_left_alone_where_commands_act_at_once() -> None:
+def test_a_state_is_left_alone_where_commands_act_at_once_and_others_only_move_on() -> None:
     latency, state = Latency(PERIOD), helpers.random_state(np.random.default_rng(4))
     followed(latency, jagged(np.random.default_rng(5), 100), 0)
     assert latency.ahead(state) is state
-
-
-def test_what_is_asked_for_by_others_foretells_nothing_but_that_it_moves_on() -> None:
     latency, state = Latency(PERIOD), helpers.random_state(np.random.default_rng(6))
     followed(latency, jagged(np.random.default_rng(7), 200), 3)
     latency.forget()

@@ -89,13 +89,16 @@ def test_a_place_out_of_reach_is_missed_by_its_distance_to_the_nearest_one(leg: 
     assert (found.miss[~is_beside] > 0.0).all()
 
 
-def test_a_foot_too_near_to_its_hip_is_missed() -> None:
+def test_a_foot_too_near_to_its_hip_is_missed_and_a_nan_answered_by_nans() -> None:
     # Thigh and calf are equally long here, so only a made-up leg has a hole in its reach.
     leg = packed(LegGeometry(np.zeros(3), 0.1, 0.25, 0.15))
     place = np.array([[0.0, 0.1, -0.04]])
     assert leg_angles(leg, place).miss == pytest.approx(0.06, abs=EXACT)
     inside = leg_angles(leg, np.array([[0.3, 0.06, 0.0]]))
     assert inside.miss == pytest.approx(0.04, abs=EXACT)
+    found = leg_angles(LegGeometry.of(MODEL, Leg.FL), np.full((1, 3), np.nan))
+    assert np.isnan(found.q).all()
+    assert np.isnan(found.miss).all()
 
 
 @pytest.mark.parametrize("leg", [Leg.FL, Leg.RL])
@@ -121,12 +124,6 @@ def places(geometry: LegGeometry, seed: int) -> np.ndarray:
         [0.0, 0.5 * geometry.width, 0.0],
     ]
     return geometry.p_base_hip + np.vstack([rng.uniform(-0.6, 0.6, size=(MANY, 3)), odd])
-
-
-def test_a_nan_is_answered_by_nans() -> None:
-    found = leg_angles(LegGeometry.of(MODEL, Leg.FL), np.full((1, 3), np.nan))
-    assert np.isnan(found.q).all()
-    assert np.isnan(found.miss).all()
 
 
 @pytest.mark.parametrize("leg", LEGS)

@@ -34,14 +34,16 @@ def described(tmp_path: Path, text: str) -> RobotModel:
     return RobotModel(find_description(path))
 
 
-def test_mass_and_gravity_are_the_robots() -> None:
+def test_mass_torques_and_speeds_are_the_robots() -> None:
     links = re.findall(r'<mass\s+value="([^"]+)"', installed_urdf())
     assert MODEL.mass == pytest.approx(sum(map(float, links)), abs=1e-9)
     assert MODEL.mass == pytest.approx(GO2_MASS, abs=1e-3)
     assert MODEL.gravity == 9.81
+    np.testing.assert_allclose(MODEL.torque_limits, MODEL.description.efforts)
+    np.testing.assert_allclose(MODEL.speed_limits, MODEL.description.speeds)
 
 
-def test_the_limits_are_the_tighter_of_urdf_and_published_ones() -> None:
+def test_the_limits_are_the_tighter_of_published_ones_and_those_of_any_urdf(tmp_path: Path) -> None:
     robot = pin.buildModelFromUrdf(str(find_description().urdf_path), pin.JointModelFreeFlyer())
     lower, upper = robot.lowerPositionLimit[7:], robot.upperPositionLimit[7:]
     hips, others = np.arange(12) % 3 == 0, np.arange(12) % 3 != 0
@@ -50,17 +52,9 @@ def test_the_limits_are_the_tighter_of_urdf_and_published_ones() -> None:
     np.testing.assert_array_equal(MODEL.q_upper[hips], HIP_LIMIT)
     np.testing.assert_array_equal(MODEL.q_lower[others], lower[others])
     np.testing.assert_array_equal(MODEL.q_upper[others], upper[others])
-
-
-def test_a_urdf_with_tighter_hips_keeps_them(tmp_path: Path) -> None:
     narrow = described(tmp_path, installed_urdf().replace("1.0472", "0.5"))
     np.testing.assert_array_equal(narrow.q_upper[0::3], 0.5)
     np.testing.assert_array_equal(narrow.q_lower[0::3], -0.5)
-
-
-def test_torque_and_speed_limits_are_the_descriptions() -> None:
-    np.testing.assert_allclose(MODEL.torque_limits, MODEL.description.efforts)
-    np.testing.assert_allclose(MODEL.speed_limits, MODEL.description.speeds)
 
 
 def test_the_hips_and_nominal_feet_lie_symmetrically_below_the_trunk() -> None:
@@ -115,9 +109,12 @@ def test_the_foot_mesh_is_nearly_a_sphere_of_the_foot_radius() -> None:
 # --- descriptions that are no Go2 -----------------------------------------------------------------
 
 
-def test_a_missing_description_is_refused(tmp_path: Path) -> None:
+def test_a_missing_urdf_or_one_that_pinocchio_cannot_read_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DescriptionError, match=r"nowhere\.urdf"):
         RobotModel(find_description(tmp_path / "nowhere.urdf"))
+    broken = installed_urdf().replace('<parent link="FL_hip"', '<parent link="nothing"')
+    with pytest.raises(DescriptionError, match=r"cannot read the URDF .*robot\.urdf"):
+        described(tmp_path, broken)
 
 
 def test_a_robot_with_one_joint_more_is_refused_with_the_names(tmp_path: Path) -> None:
@@ -130,19 +127,13 @@ def test_a_robot_with_one_joint_more_is_refused_with_the_names(tmp_path: Path) -
         described(tmp_path, installed_urdf().replace("</robot>", arm))
 
 
-def test_a_urdf_that_pinocchio_cannot_read_is_refused_with_its_path(tmp_path: Path) -> None:
-    broken = installed_urdf().replace('<parent link="FL_hip"', '<parent link="nothing"')
-    with pytest.raises(DescriptionError, match=r"cannot read the URDF .*robot\.urdf"):
-        described(tmp_path, broken)
-
-
 def changed(mass: float) -> RobotModel:
     model = RobotModel()
     model.pin_model.inertias[1].mass += mass
     return model
 
 
-def test_models_of_the_same_robot_have_the_same_fingerprint() -> None:
+def test_models_of_the_same_robot_have_the_same_fingerprint_and_another_one_another() -> None:
     own = fingerprint(RobotModel())
     assert len(own) == FINGERPRINT
     assert own == fingerprint(RobotModel())
@@ -151,9 +142,6 @@ def test_models_of_the_same_robot_have_the_same_fingerprint() -> None:
     assert model.pin_model.armature[0] == 0.0
     model.pin_model.armature[0] = -0.0
     assert own == fingerprint(model)
-
-
-def test_another_mass_rotor_or_foot_is_another_robot() -> None:
     models = [
         RobotModel(),
         changed(1e-3),

@@ -62,36 +62,35 @@ def test_the_limits_are_the_line_between_its_corners(name: str) -> None:
     np.testing.assert_allclose(lower, -line(motor, -SPEEDS), atol=EXACT)
 
 
-def test_limits_have_the_shape_of_the_velocities() -> None:
+def test_limits_have_the_shape_of_the_velocities_and_no_more_power_than_a_motor_gives() -> None:
     v = SPEEDS[:24].reshape(2, 3, 4, 12)
     lower, upper = LINE.limits(v)
     assert lower.shape == upper.shape == v.shape
     np.testing.assert_array_equal(upper[1, 2, 3], LINE.limits(SPEEDS[23])[1])
-
-
-def test_no_motor_gives_more_power_than_at_half_its_speed_without_load() -> None:
     _, upper = LINE.limits(SPEEDS)
     most = LINE.limits(LINE.no_load_speed / 2)[1] * LINE.no_load_speed / 2
     assert ((upper * SPEEDS).max(axis=0) <= most + ROUNDING).all()
     np.testing.assert_allclose(most, 324.2, atol=0.1)  # of hip, thigh and calf alike
 
 
-def test_the_numbers_are_those_of_the_description() -> None:
+def test_the_numbers_are_the_descriptions_and_the_calf_is_a_hip_behind_a_linkage() -> None:
     np.testing.assert_array_equal(LINE.peak, MODEL.description.efforts)
     np.testing.assert_array_equal(LINE.no_load_speed, MODEL.description.speeds)
     np.testing.assert_allclose(LINE.knee_speed, KNEE_SHARE * MODEL.speed_limits)
     np.testing.assert_array_equal(MODEL.torque_limits, LINE.peak)
-
-
-def test_the_calf_is_the_hips_motor_behind_a_linkage() -> None:
-    """The module's docstring says so: the ratio of torques is that of speeds."""
+    # The module's docstring says so: the ratio of torques is that of speeds.
     by_torque, by_speed = LINE.peak[2] / LINE.peak[0], LINE.no_load_speed[0] / LINE.no_load_speed[2]
     assert by_torque == pytest.approx(by_speed, rel=1e-3)
 
 
-def test_a_share_scales_the_whole_line() -> None:
+def test_a_share_scales_the_whole_line_and_is_one_on_it() -> None:
     for whole, part in zip(LINE.limits(SPEEDS), LINE.scaled(0.4).limits(SPEEDS), strict=True):
         np.testing.assert_allclose(part, 0.4 * whole)
+    v = 0.7 * MODEL.speed_limits
+    lower, upper = LINE.limits(v)
+    np.testing.assert_allclose(LINE.share(upper, v), 1.0)
+    np.testing.assert_allclose(LINE.share(lower / 2, v), 0.5)
+    np.testing.assert_allclose(LINE.share(LINE.peak, LINE.no_load_speed), 1 / LEAST_SHARE)
 
 
 def test_a_torque_is_that_of_the_servo_cut_to_the_line() -> None:
@@ -105,14 +104,6 @@ def test_a_torque_is_that_of_the_servo_cut_to_the_line() -> None:
     fast = 0.9 * MODEL.speed_limits
     np.testing.assert_array_equal(LINE.torque(strong, q, fast), LINE.limits(fast)[1])
     np.testing.assert_array_equal(LINE.torque(strong, q, -fast), LINE.peak)
-
-
-def test_a_share_is_one_on_the_line_and_finite_beyond_it() -> None:
-    v = 0.7 * MODEL.speed_limits
-    lower, upper = LINE.limits(v)
-    np.testing.assert_allclose(LINE.share(upper, v), 1.0)
-    np.testing.assert_allclose(LINE.share(lower / 2, v), 0.5)
-    np.testing.assert_allclose(LINE.share(LINE.peak, LINE.no_load_speed), 1 / LEAST_SHARE)
 
 
 def test_an_unknown_motor_is_refused_with_the_names_that_exist() -> None:
@@ -168,14 +159,11 @@ def turning(state: RobotState, rng: np.random.Generator) -> RobotState:
     return replace(state, v=np.concatenate([state.v[:6], speeds]))
 
 
-def test_a_joint_at_rest_gets_friction_only_if_it_shall_move() -> None:
+def test_friction_is_by_part_and_given_at_rest_only_to_move() -> None:
     friction, rest = JointFriction(), np.zeros(12)
     assert not friction.torque(rest, rest).any()
     started = friction.torque(rest, np.full(12, 20.0))
     assert (started > 0.9 * np.array(friction.dry)).all()
-
-
-def test_by_part_repeats_hip_thigh_and_calf_for_every_leg() -> None:
     friction = JointFriction.by_part((0.1, 0.2, 0.9), (0.0, 0.1, 0.3))
     assert friction.dry == (0.1, 0.2, 0.9) * 4
     assert friction.viscous == (0.0, 0.1, 0.3) * 4

@@ -35,30 +35,29 @@ def written(folder: Path, name: str) -> Path:
     return file
 
 
-def test_three_robots_ship() -> None:
+def test_robots_of_three_kinds_and_one_value_each_ship_and_others_are_refused(
+    tmp_path: Path,
+) -> None:
     assert profile_names() == ("a1", "go1", "go2")
+    file = tmp_path / "mine.toml"
+    file.write_text('robot = "b9"\n', encoding="utf-8")
+    for make in (lambda: find_profile("b9"), lambda: load_config(file)):
+        with pytest.raises(ConfigError, match="unknown robot 'b9'; valid: a1, go1, go2"):
+            make()
 
 
 @EVERY
-def test_a_profile_is_one_value_that_can_be_sent_to_another_process(name: str) -> None:
+def test_a_robots_profile_snapshot_and_simulation_are_those_of_its_model(name: str) -> None:
     profile = find_profile(name)
     assert isinstance(profile, RobotProfile)
     assert hash(profile) == hash(find_profile(name))
     assert pickle.loads(pickle.dumps(profile)) == profile
-
-
-@EVERY
-def test_the_snapshot_of_every_robot_is_that_of_pinocchio(name: str) -> None:
     model, rng = model_of(name), np.random.default_rng(7)
     for _ in range(20):
         state = random_state(rng)
         ours, theirs = model.snapshot(state), model.pinocchio_snapshot(state)
         np.testing.assert_allclose(ours.row, theirs.row, atol=ROUNDING)
         assert ours.profile is theirs.profile is model.profile
-
-
-@EVERY
-def test_feet_and_mass_of_the_simulated_robot_are_those_of_the_model(name: str) -> None:
     model, plant = model_of(name), MujocoPlant(robot=name)
     assert plant.robot == name
     assert plant.total_mass == pytest.approx(model.mass, rel=1e-6)
@@ -87,14 +86,6 @@ def test_every_robot_can_raise_its_paw_and_bow(name: str) -> None:
     checker = FeasibilityChecker(model_of(name))
     assert checker.check("high_five").ok
     assert checker.check("bow").ok
-
-
-def test_an_unknown_robot_is_refused_with_those_that_are_known(tmp_path: Path) -> None:
-    file = tmp_path / "mine.toml"
-    file.write_text('robot = "b9"\n', encoding="utf-8")
-    for make in (lambda: find_profile("b9"), lambda: load_config(file)):
-        with pytest.raises(ConfigError, match="unknown robot 'b9'; valid: a1, go1, go2"):
-            make()
 
 
 def test_a_file_that_names_a_robot_begins_with_its_numbers(tmp_path: Path) -> None:

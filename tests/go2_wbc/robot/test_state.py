@@ -44,13 +44,10 @@ def test_the_tilt_goes_up_to_half_a_turn_and_ignores_yaw(angle: float, axis: int
     assert state_of(q).tilt == pytest.approx(angle, abs=1e-7)
 
 
-def test_the_pitch_at_the_pole_is_finite() -> None:
+def test_parts_of_a_state_are_pinocchios_and_its_pitch_at_the_pole_is_finite() -> None:
     q = standing_q()
     q[3:7] = pin.Quaternion(rotation_from_rpy(0.0, np.pi / 2, 0.0)).coeffs() * (1 + 1e-12)
     assert state_of(q).rpy[1] == pytest.approx(np.pi / 2, abs=1e-5)
-
-
-def test_the_parts_of_a_state_are_where_pinocchio_has_them() -> None:
     state = state_of(np.arange(19.0), np.arange(18.0))
     np.testing.assert_array_equal(state.p_world_base, [0.0, 1.0, 2.0])
     np.testing.assert_array_equal(state.joint_positions, np.arange(7.0, 19.0))

@@ -96,7 +96,7 @@ def test_legs_change_what_they_do_at_events(t: float, tasks: list[int]) -> None:
     assert curves(4).at(t).legs.tolist() == tasks
 
 
-def test_a_load_is_ramped_to_and_from_the_changes_of_a_foots_contact() -> None:
+def test_a_load_is_ramped_at_the_changes_of_a_foots_contact_or_comes_at_once() -> None:
     asked = curves(5)
     for t in np.arange(0.0, 1.2, 0.007):
         lifting = np.interp(t, [0.8, 0.9], [1.0, 0.0])
@@ -104,10 +104,6 @@ def test_a_load_is_ramped_to_and_from_the_changes_of_a_foots_contact() -> None:
         share, target = np.array([1.0, lifting, landed, 1.0]), asked.at(float(t))
         np.testing.assert_allclose(target.normal_force_max, 300.0 * share, atol=1e-9)
         np.testing.assert_allclose(target.normal_force_min, 3.0 * share, atol=1e-9)
-
-
-def test_without_a_ramp_a_foot_is_loaded_at_once() -> None:
-    asked = curves(5)
     jumps = replace(asked, load=StanceLoad(0.0, 3.0, 300.0))
     assert jumps.at(0.5 + 1e-6).normal_force_max[2] == 300.0
     assert jumps.at(0.9 - 1e-6).normal_force_max[1] == 300.0

@@ -81,14 +81,10 @@ def decision(solution: WbcSolution) -> np.ndarray:
 def test_the_solution_obeys_the_equation_of_motion_with_an_unactuated_base(
     backend: str, solver: str
 ) -> None:
-    """M qdd + h = S' tau + J' f in all 18 rows; no torque acts on the first six."""
-    for (snapshot, _), solution in zip(random_cases(), solved(backend, solver), strict=True):
+    """M qdd + h = S' tau + J' f in all 18 rows; no torque acts on the first six, no foot on air."""
+    found = solved(backend, solver)
+    for (snapshot, reference), solution in zip(random_cases(), found, strict=True):
         assert motion_error(snapshot, solution) < MOTION_TOLERANCE
-
-
-@pytest.mark.parametrize(("backend", "solver"), PAIRS, ids=IDS)
-def test_feet_in_the_air_carry_no_force(backend: str, solver: str) -> None:
-    for (_, reference), solution in zip(random_cases(), solved(backend, solver), strict=True):
         assert not solution.forces[~reference.stance].any()
 
 
@@ -241,12 +237,9 @@ def test_just_outside_the_singularity_both_forms_still_agree(leg: Leg) -> None:
     assert tested >= 3
 
 
-def test_a_standing_leg_is_far_from_the_singularity() -> None:
+def test_the_cases_go_through_every_contact_mode_far_from_the_singularity() -> None:
     rng = np.random.default_rng(9)
     for _ in range(50):
         snapshot = model().snapshot(random_state(rng))
         assert min(determinant(snapshot, leg) for leg in LEGS) > 20 * SINGULAR_DETERMINANT
-
-
-def test_the_cases_go_through_every_contact_mode() -> None:
     assert {reference.legs for _, reference in random_cases()} == set(MODES)

@@ -190,7 +190,7 @@ def test_tasks_of_a_users_own_are_condensed_along() -> None:
         assert [row.name for row in ours.residuals] == [row.name for row in theirs.residuals]
 
 
-def test_torques_are_those_of_inverse_dynamics() -> None:
+def test_torques_are_inverse_dynamics_and_residuals_those_of_the_readable_problem() -> None:
     wbc = WholeBodyController(MODEL)
     for snapshot, reference in cases(MODEL, 52, seed=28):
         solution = wbc.solve_compiled(snapshot, reference)
@@ -200,6 +200,10 @@ def test_torques_are_those_of_inverse_dynamics() -> None:
         needed = MODEL.inverse_dynamics(state.q, state.v, solution.qdd)
         pushed = np.einsum("fai,fa->i", snapshot.J_contacts, solution.forces)
         np.testing.assert_allclose(needed - pushed, [*np.zeros(6), *solution.tau], atol=1e-8)
+    for snapshot, reference in cases(MODEL, 26, seed=23):
+        solution = wbc.solve(snapshot, reference)
+        z = np.concatenate([solution.qdd, solution.forces.ravel()])
+        assert solution.residuals == wbc.formulate(snapshot, reference).residuals(z)
 
 
 def test_a_tick_leaves_nothing_to_the_next() -> None:
@@ -238,14 +242,6 @@ def test_a_bound_counts_as_met_by_the_active_sets_tolerance(bound: float) -> Non
         assert is_within(bound - off, bound, bound + 1.0) is expected
     assert not is_within(bound, bound + slack, bound - slack), "no bounds at all"
     assert not is_within(np.nan, -np.inf, np.inf)
-
-
-def test_residuals_are_those_of_the_readable_problem() -> None:
-    wbc = WholeBodyController(MODEL)
-    for snapshot, reference in cases(MODEL, 26, seed=23):
-        solution = wbc.solve(snapshot, reference)
-        z = np.concatenate([solution.qdd, solution.forces.ravel()])
-        assert solution.residuals == wbc.formulate(snapshot, reference).residuals(z)
 
 
 @pytest.mark.parametrize("angle", [2.9, 3.05, np.pi])

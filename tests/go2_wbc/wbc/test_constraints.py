@@ -193,13 +193,10 @@ def test_beyond_a_limit_a_joint_that_rests_or_moves_out_has_to_come_back(
     assert (lower > np.minimum(out / HORIZON, BRAKING - EXACT)).all()
 
 
-def test_a_resting_joint_far_from_its_limits_is_free() -> None:
+def test_a_joint_at_rest_far_from_its_limits_is_free_and_a_too_fast_one_slowed_down() -> None:
     lower, upper = joint_bounds(MIDDLE, np.zeros(12))
     assert (upper > BRAKING).all()
     assert (lower < -BRAKING).all()
-
-
-def test_a_joint_beyond_its_speed_limit_is_slowed_down() -> None:
     endless = replace(LIMITS, q_lower=MODEL.q_lower - 100.0, q_upper=MODEL.q_upper + 100.0)
     for sign in (1.0, -1.0):
         fast = joint_snapshot(MIDDLE, sign * (MODEL.speed_limits + 1.0))

@@ -62,17 +62,12 @@ STAND = standing(MODEL)
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
-def test_the_forces_of_a_static_stand_sum_to_the_weight(backend: str) -> None:
-    forces = WholeBodyController(MODEL, backend).solve(*STAND).forces
-    weight = [0.0, 0.0, MODEL.mass * MODEL.gravity]
-    np.testing.assert_allclose(forces.sum(axis=0), weight, atol=SOFT)
-
-
-@pytest.mark.parametrize("backend", BACKENDS)
-def test_the_torques_of_a_static_stand_are_its_static_equilibrium(backend: str) -> None:
-    """tau = g - J' f joint by joint, and no moment about the CoM is left."""
+def test_forces_and_torques_of_a_static_stand_are_its_static_equilibrium(backend: str) -> None:
+    """sum f = m g, tau = g - J' f joint by joint, and no moment about the CoM is left."""
     snapshot, reference = STAND
     solution = WholeBodyController(MODEL, backend).solve(snapshot, reference)
+    weight = [0.0, 0.0, MODEL.mass * MODEL.gravity]
+    np.testing.assert_allclose(solution.forces.sum(axis=0), weight, atol=SOFT)
     gravity = MODEL.inverse_dynamics(snapshot.state.q, np.zeros(18), np.zeros(18))
     supported = np.einsum("lij,li->j", snapshot.J_contacts, solution.forces)
     np.testing.assert_allclose(solution.tau, (gravity - supported)[6:], atol=SOFT)
@@ -189,12 +184,17 @@ def test_a_joint_that_runs_towards_its_limit_is_decelerated(backend: str, side: 
         assert slowed < 0.0
 
 
-def test_the_joint_margin_moves_both_limits_inwards() -> None:
+def test_the_joint_margin_moves_limits_inwards_and_a_residual_is_the_largest_error() -> None:
     margin = 0.07
     controller = WholeBodyController(MODEL, config=WbcConfig(joint_margin=margin))
     limits = controller.inequalities[-1]
     np.testing.assert_allclose(limits.q_upper, MODEL.q_upper - margin)  # pyright: ignore
     np.testing.assert_allclose(limits.q_lower, MODEL.q_lower + margin)  # pyright: ignore
+    snapshot, reference = STAND
+    solution = WholeBodyController(MODEL).solve(snapshot, pulled(reference, [50.0, 0.0, 0.0]))
+    a_com = snapshot.J_com @ solution.qdd + snapshot.drift_com
+    rows = {row.name: row.norm for row in solution.residuals}
+    assert rows["body position"] == pytest.approx(np.abs(a_com - [50.0, 0.0, 0.0]).max())
 
 
 # --- no solution ----------------------------------------------------------------------------------
@@ -263,14 +263,6 @@ def test_the_residuals_of_a_solution_audit_it(backend: str) -> None:
             assert rows["leg posture"] == 0.0
 
 
-def test_the_residual_of_a_task_is_its_largest_error() -> None:
-    snapshot, reference = STAND
-    solution = WholeBodyController(MODEL).solve(snapshot, pulled(reference, [50.0, 0.0, 0.0]))
-    a_com = snapshot.J_com @ solution.qdd + snapshot.drift_com
-    rows = {row.name: row.norm for row in solution.residuals}
-    assert rows["body position"] == pytest.approx(np.abs(a_com - [50.0, 0.0, 0.0]).max())
-
-
 @pytest.mark.parametrize("legs", MODES)
 def test_the_problem_knows_who_contributed_which_rows(legs: tuple) -> None:
     snapshot = MODEL.snapshot(random_state(np.random.default_rng(41)))
@@ -290,7 +282,7 @@ def test_the_problem_knows_who_contributed_which_rows(legs: tuple) -> None:
     assert problem.weights[3] == weight
 
 
-def test_solving_leaves_snapshot_and_reference_untouched_and_repeats_exactly() -> None:
+def test_a_solution_is_pure_torque_and_solving_repeats_exactly() -> None:
     controller = WholeBodyController(MODEL)
     snapshot, reference = next(cases(MODEL, 1, seed=51))
     before = [snapshot.mass_matrix.copy(), snapshot.bias.copy(), reference.p_world_feet.copy()]
@@ -299,9 +291,6 @@ def test_solving_leaves_snapshot_and_reference_untouched_and_repeats_exactly() -
     after = [snapshot.mass_matrix, snapshot.bias, reference.p_world_feet]
     for a, b in zip(before, after, strict=True):
         np.testing.assert_array_equal(a, b)
-
-
-def test_a_solution_is_commanded_as_pure_torque() -> None:
     solution = WholeBodyController(MODEL).solve(*STAND)
     np.testing.assert_array_equal(solution.command.tau, solution.tau_motors)
     assert not solution.command.kp.any()

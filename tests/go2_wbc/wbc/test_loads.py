@@ -47,9 +47,14 @@ def test_of_all_loads_that_act_at_that_point_the_most_even_are_taken(
     np.testing.assert_allclose(relative_loads(places, point, OPEN[:feet]), 1 + more, atol=ROUNDING)
 
 
-def test_a_load_is_never_far_from_the_mean_nor_above_what_a_foot_may_bear() -> None:
+def test_loads_are_near_the_mean_and_the_planned_ones_are_the_controllers() -> None:
     loads = relative_loads(FEET, np.array([0.5, 0.0]), np.array([10.0, 0.7, 10.0, 10.0]))
     np.testing.assert_allclose(loads, [MOST_LOAD, 0.7, LEAST_LOAD, LEAST_LOAD])
+    snapshot, reference = leaning((ST, ST, ST, ST))
+    normal = WholeBodyController(MODEL).solve(snapshot, reference).forces[:, 2]
+    loads = np.empty(4)
+    plan_loads(snapshot, Target.of(reference.row), WEIGHT, loads)
+    np.testing.assert_allclose(loads, normal / normal.mean(), atol=0.1)
 
 
 def leaning(legs: tuple) -> tuple[Snapshot, Reference]:
@@ -72,11 +77,3 @@ def test_all_feet_use_much_the_same_part_of_their_friction(backend: str, legs: t
     assert forces[:, 2].max() > 1.5 * forces[:, 2].min()
     uses = np.linalg.norm(forces[:, :2], axis=1) / forces[:, 2]
     assert uses.max() < EVEN_USE * uses.min()
-
-
-def test_the_planned_loads_are_those_that_the_controller_gives() -> None:
-    snapshot, reference = leaning((ST, ST, ST, ST))
-    normal = WholeBodyController(MODEL).solve(snapshot, reference).forces[:, 2]
-    loads = np.empty(4)
-    plan_loads(snapshot, Target.of(reference.row), WEIGHT, loads)
-    np.testing.assert_allclose(loads, normal / normal.mean(), atol=0.1)

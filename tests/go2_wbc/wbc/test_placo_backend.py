@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 
 from go2_wbc.errors import QpInfeasible
-from go2_wbc.legs import JOINT_NAMES
-from go2_wbc.robot.inverse_kinematics import load_placo_robot
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.controller import WbcConfig, WholeBodyController
 from tests.engine_helpers import (
@@ -16,7 +14,6 @@ from tests.engine_helpers import (
     cases,
     fast_cases,
     motion_error,
-    random_state,
     solved_alike,
     standing,
     state_of,
@@ -49,12 +46,17 @@ def test_both_back_ends_find_the_same_torques_forces_and_accelerations(foot_radi
         assert motion_error(snapshot, b) < MOTION_TOLERANCE
 
 
-def test_both_back_ends_keep_near_the_planned_forces() -> None:
+def test_both_back_ends_keep_near_planned_forces_and_ramp_them_to_zero_alike() -> None:
     rng, problems = np.random.default_rng(8), []
     for snapshot, plain in cases(MODEL, STATES // 3, seed=9):
         problems += [(snapshot, with_planned_forces(plain, rng)), (snapshot, plain)]  # and back
     for *_, a, b in solved_alike(*both(), problems, TORQUE_TOLERANCE):
         np.testing.assert_allclose(a.forces, b.forces, atol=FORCE_TOLERANCE, rtol=0)
+    snapshot, reference = standing(MODEL)
+    least, greatest = np.array([0.0, 5.0, 5.0, 5.0]), np.array([0.0, 250.0, 250.0, 250.0])
+    unloaded = replace(reference, normal_force_min=least, normal_force_max=greatest)
+    ((*_, b),) = solved_alike(*both(), [(snapshot, unloaded)], TORQUE_TOLERANCE)
+    np.testing.assert_allclose(b.forces[0], 0.0, atol=FORCE_TOLERANCE)
 
 
 def test_both_back_ends_keep_to_the_motors_line_where_joints_are_fast() -> None:
@@ -108,48 +110,21 @@ def test_a_joint_at_its_limit_is_treated_alike() -> None:
         assert b.qdd[8] <= 0.0 or off < 0.0
 
 
-def test_a_foot_whose_normal_force_is_ramped_to_zero_is_treated_alike() -> None:
+@pytest.mark.parametrize("case", ["forces beyond the torques", "no torque to hold feet"])
+def test_contradicting_limits_raise_with_a_residual_table(case: str) -> None:
+    """Forces of which the least is above the greatest: in ``test_bad_input``."""
     snapshot, reference = standing(MODEL)
-    least, greatest = np.array([0.0, 5.0, 5.0, 5.0]), np.array([0.0, 250.0, 250.0, 250.0])
-    unloaded = replace(reference, normal_force_min=least, normal_force_max=greatest)
-    ((*_, b),) = solved_alike(*both(), [(snapshot, unloaded)], TORQUE_TOLERANCE)
-    np.testing.assert_allclose(b.forces[0], 0.0, atol=FORCE_TOLERANCE)
-
-
-WHIRL = 3.0 * np.random.default_rng(1).normal(size=12)
-
-
-@pytest.mark.parametrize(
-    ("least", "greatest", "share", "v_joints"),
-    [
-        (50.0, 20.0, 1.0, np.zeros(12)),
-        (600.0, 700.0, 1.0, np.zeros(12)),
-        (0.0, 250.0, 1e-9, WHIRL),
-    ],
-    ids=["least above greatest force", "forces beyond the torques", "no torque to hold feet"],
-)
-def test_contradicting_limits_raise_with_a_residual_table(
-    least: float, greatest: float, share: float, v_joints: np.ndarray
-) -> None:
-    snapshot, reference = standing(MODEL)
-    moving = replace(snapshot.state, v=np.concatenate([np.zeros(6), v_joints]))
-    asked = replace(
-        reference, normal_force_min=np.full(4, least), normal_force_max=np.full(4, greatest)
-    )
+    asked, moving, share = reference, snapshot.state, 1e-9
+    if case == "forces beyond the torques":
+        share = 1.0
+        most = {"normal_force_min": np.full(4, 600.0), "normal_force_max": np.full(4, 700.0)}
+        asked = replace(reference, **most)
+    else:
+        whirl = 3.0 * np.random.default_rng(1).normal(size=12)
+        moving = replace(moving, v=np.concatenate([np.zeros(6), whirl]))
     for controller in both(config=WbcConfig(torque_share=share)):
         with pytest.raises(QpInfeasible) as caught:
             controller.solve(MODEL.snapshot(moving), asked)
         names = [source.name for source in controller.formulate(snapshot, reference).sources]
         assert [row.name for row in caught.value.residuals] == names
         assert max(row.norm for row in caught.value.residuals[-3:]) > 0.0
-
-
-def test_placo_has_the_same_dynamics_as_pinocchio() -> None:
-    robot = load_placo_robot(MODEL)
-    assert list(robot.joint_names()) == list(JOINT_NAMES)
-    snapshot = MODEL.snapshot(random_state(np.random.default_rng(8)))
-    robot.state.q, robot.state.qd = snapshot.state.q, snapshot.state.v
-    robot.update_kinematics()
-    np.testing.assert_allclose(robot.mass_matrix(), snapshot.mass_matrix, atol=1e-12)
-    np.testing.assert_allclose(robot.non_linear_effects(), snapshot.bias, atol=1e-12)
-    np.testing.assert_allclose(robot.com_jacobian(), snapshot.J_com, atol=1e-12)

@@ -102,15 +102,14 @@ def test_a_nan_is_refused_at_once(solver: str, part: str) -> None:
         solve_dense_qp(replace(qp, **{part: values}), solver)
 
 
-def test_an_answer_that_is_not_finite_counts_as_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_answer_that_is_not_finite_or_breaks_the_bounds_counts_as_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     nan = SimpleNamespace(found=True, x=np.full(12, np.nan), z=np.zeros(38), y=None)
     monkeypatch.setattr(qpsolvers, "solve_problem", lambda *_, **__: nan)
     with pytest.raises(QpInfeasible, match="no feasible point"):
         solve_dense_qp(random_qp(1, 0), "daqp")
-
-
-def test_an_answer_that_breaks_the_bounds_counts_as_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Told of an impossible goal, daqp has returned 1e300 as solved."""
+    # Told of an impossible goal, daqp has returned 1e300 as solved.
     huge = SimpleNamespace(found=True, x=np.full(12, 1e300), z=np.zeros(38), y=None)
     monkeypatch.setattr(qpsolvers, "solve_problem", lambda *_, **__: huge)
     with pytest.raises(QpInfeasible, match="breaks the constraints"):
@@ -125,11 +124,16 @@ def test_every_valid_solver_is_installed(solver: str) -> None:
     assert check_solver(solver) == solver
 
 
-def test_an_unknown_solver_is_answered_with_the_valid_names() -> None:
+def test_a_solver_that_is_unknown_or_not_tuned_is_answered_with_the_valid_names(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     with pytest.raises(
         SolverUnavailable, match=r"QP solver 'gurobi'; valid: active_set, daqp, proxqp, quad"
     ):
         check_solver("gurobi")
+    monkeypatch.setattr(qpsolvers, "available_solvers", [*solvers.SOLVERS, "osqp"])
+    with pytest.raises(SolverUnavailable, match="unknown QP solver 'osqp'"):
+        check_solver("osqp")
 
 
 @pytest.mark.parametrize(
@@ -143,11 +147,3 @@ def test_an_uninstalled_solver_is_answered_with_the_install_line(
     expected = f"'{solver}' is not installed: pip install {package}; installed: {', '.join(others)}"
     with pytest.raises(SolverUnavailable, match=expected):
         check_solver(solver)
-
-
-def test_a_solver_that_qpsolvers_has_but_we_do_not_tune_is_refused(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(qpsolvers, "available_solvers", [*solvers.SOLVERS, "osqp"])
-    with pytest.raises(SolverUnavailable, match="unknown QP solver 'osqp'"):
-        check_solver("osqp")

@@ -121,7 +121,7 @@ def test_the_attitudes_error_is_the_logarithm_up_to_a_turn_by_pi(seed: int, angl
     np.testing.assert_allclose(error, turn, atol=LOGARITHM)
 
 
-def test_a_payload_falls_with_the_robot() -> None:
+def test_a_payload_falls_with_the_robot_and_is_borne_evenly_by_its_feet() -> None:
     """The CoM's acceleration is that of all mass, under all weight."""
     bare, reference, z = scene(3)
     snapshot = MODEL.snapshot(bare.state, Payload(4.0, (0.05, 0.08, 0.1)))
@@ -136,18 +136,13 @@ def test_a_payload_falls_with_the_robot() -> None:
     )
     task = BodyPosition(GAINS, MODEL.mass * MODEL.gravity)
     np.testing.assert_allclose(residual(task, snapshot, reference, z), a_com - wanted, atol=1e-9)
-
-
-def test_feet_are_asked_to_bear_a_payload_evenly() -> None:
-    bare, reference, z = scene(3)
-    snapshot = MODEL.snapshot(bare.state, Payload(4.0, (0.05, 0.08, 0.1)))
     reference = replace(reference, legs=(ST, SW, ST, ST))
     found = residual(ForceRegularisation(160.0), snapshot, reference, z).reshape(3, 3)
     share = (160.0 + 4.0 * MODEL.gravity) / 3.0
     np.testing.assert_allclose(found[:, 2], z[[20, 26, 29]] - share, atol=EXACT)
 
 
-def test_in_flight_the_attitude_weighs_less_than_the_feet_that_turn_it() -> None:
+def test_the_attitude_weighs_less_in_flight_and_by_a_discount() -> None:
     """It weighed ten times as much, and feet landed 0.1 m behind their footholds."""
     _, reference, _ = scene(1)
     flying = replace(reference, legs=(LegTask.SWING,) * 4)
@@ -155,6 +150,12 @@ def test_in_flight_the_attitude_weighs_less_than_the_feet_that_turn_it() -> None
     assert task.weight_at(reference) == 10.0
     assert task.weight_at(flying) == 0.05
     assert BodyOrientation(GAINS, weight=0.0).weight_at(flying) == 0.0, "a task that is off"
+    _, reference, _ = scene(0)
+    task = BodyOrientation(Gains.uniform(1.0, 1.0), weight=10.0, flight_weight=3.0)
+    discounted = replace(reference, orientation_discount=4.0)
+    assert (task.weight_at(reference), task.weight_at(discounted)) == (10.0, 2.0)
+    flying = replace(discounted, legs=(SW,) * 4, orientation_discount=1.0)
+    assert task.weight_at(flying) == 3.0
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -209,15 +210,6 @@ def test_planned_forces_and_their_weight_take_the_place_of_the_even_share(legs: 
     found = residual(task, snapshot, planned, z)
     wanted = (z[18:].reshape(4, 3) - planned.f_world_feet)[stance].ravel()
     np.testing.assert_allclose(found, wanted, atol=EXACT)
-
-
-def test_a_discount_divides_the_weight_of_the_attitude() -> None:
-    _, reference, _ = scene(0)
-    task = BodyOrientation(Gains.uniform(1.0, 1.0), weight=10.0, flight_weight=3.0)
-    discounted = replace(reference, orientation_discount=4.0)
-    assert (task.weight_at(reference), task.weight_at(discounted)) == (10.0, 2.0)
-    flying = replace(discounted, legs=(SW,) * 4, orientation_discount=1.0)
-    assert task.weight_at(flying) == 3.0
 
 
 @pytest.mark.parametrize("legs", MODES)

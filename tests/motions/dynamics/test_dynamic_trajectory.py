@@ -26,23 +26,17 @@ PLAN = DynamicTrajectory(
 )
 
 
-def test_a_plan_comes_back_from_its_bytes() -> None:
+def test_a_plan_comes_back_from_its_bytes_and_damaged_ones_are_refused() -> None:
     copy = DynamicTrajectory.from_bytes(PLAN.to_bytes())
     for name in ("times", "q", "v", "tau", "forces", "stance", "gains", "p_feet"):
         assert np.array_equal(getattr(copy, name), getattr(PLAN, name))
     assert (copy.iterations, copy.cost, copy.misses) == (7, 0.25, MISSES)
     small = DynamicTrajectory.from_bytes(PLAN.to_bytes(is_small=True))
     assert small.gains.dtype == np.float64, "they are kept in 16 bits, and reckoned with in 64"
-
-
-def test_a_damaged_file_is_refused() -> None:
     content = PLAN.to_bytes()
     for bad in (b"", b"no plan", content[:-200], content[:200], b"\x00" + content):
         with pytest.raises(MotionError, match="no dynamic trajectory"):
             DynamicTrajectory.from_bytes(bad)
-
-
-def test_numbers_that_are_none_are_refused() -> None:
     content = replace(PLAN, tau=np.full((2, 12), np.nan)).to_bytes()
     with pytest.raises(MotionError, match=r"tau must be finite and \(2, 12\)"):
         DynamicTrajectory.from_bytes(content)
@@ -63,21 +57,17 @@ def middles(plan: DynamicTrajectory) -> np.ndarray:
     return 0.5 * (plan.times[1:] + plan.times[:-1])
 
 
-def test_joints_accelerate_as_planned(plan: DynamicTrajectory, model: RobotModel) -> None:
+def test_joints_and_com_accelerate_as_planned_and_positions_are_continuous(
+    plan: DynamicTrajectory, model: RobotModel
+) -> None:
     planned = np.diff(plan.v[:, 6:], axis=0) / np.diff(plan.times)[:, None]
     curves = pieces(plan, model)
     for share in (0.01, 0.5, 0.99):
         t = plan.times[:-1] + share * np.diff(plan.times)
         assert curves(t, 2)[:, JOINTS] == pytest.approx(planned, abs=JOINT_JERK)
-
-
-def test_the_com_accelerates_as_the_forces_say(plan: DynamicTrajectory, model: RobotModel) -> None:
     wanted = plan.forces.sum(axis=1) / model.mass - [0.0, 0.0, model.gravity]
     found = pieces(plan, model)(middles(plan), 2)[:, COM]
     assert found == pytest.approx(wanted, abs=COM_ACCELERATION)
-
-
-def test_positions_and_rates_are_continuous(plan: DynamicTrajectory, model: RobotModel) -> None:
     curves = pieces(plan, model)
     inner = plan.times[1:-1]
     for order, jump in ((0, 1e-7), (1, 1e-5)):
@@ -85,13 +75,12 @@ def test_positions_and_rates_are_continuous(plan: DynamicTrajectory, model: Robo
         assert before == pytest.approx(after, abs=jump)
 
 
-def test_a_standing_foot_hardly_moves(plan: DynamicTrajectory, model: RobotModel) -> None:
+def test_a_standing_foot_hardly_moves_and_the_ends_are_those_of_the_plan(
+    plan: DynamicTrajectory, model: RobotModel
+) -> None:
     rates = pieces(plan, model)(middles(plan), 1)[:, FEET].reshape(-1, 4, 3)
     settled = plan.stance & np.vstack([plan.stance[:1], plan.stance[:-1]])
     assert np.linalg.norm(rates[settled], axis=-1).max() < 0.15
-
-
-def test_the_ends_are_those_of_the_plan(plan: DynamicTrajectory, model: RobotModel) -> None:
     q = centred(plan, model)
     assert q[0] == pytest.approx(plan.q[0])
     assert q[-1] == pytest.approx(plan.q[-1], abs=2e-3)

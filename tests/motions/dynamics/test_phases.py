@@ -52,7 +52,7 @@ def test_what_makes_no_phase_or_no_motion_is_refused(
         write()
 
 
-def test_feet_stay_where_they_landed() -> None:
+def test_feet_stay_where_they_landed_and_phases_can_be_pickled() -> None:
     first = Phase(0.3, ALL_FEET - {Leg.FL}, feet={Leg.FL: (0.1, 0.0, 0.0)})
     second = Phase(0.3, ALL_FEET - {Leg.RR}, feet={Leg.RR: (0.0, 0.2, 0.0)})
     problem = PhaseProblem((first, STAND, second, STAND))
@@ -61,8 +61,5 @@ def test_feet_stay_where_they_landed() -> None:
     assert np.array_equal(problem.shift, wanted)
     assert problem.foot_shifts[1, Leg.RR, 1] == 0.0
     assert problem.duration == pytest.approx(1.2)
-
-
-def test_phases_can_be_pickled() -> None:
     phase = Phase(0.3, AIR, feet=dict.fromkeys(LEGS, (0.1, 0.0, 0.0)), label="fly")
     assert pickle.loads(pickle.dumps(phase)) == phase

@@ -51,13 +51,16 @@ def test_what_is_broken_in_a_solved_plan_is_found(
     assert name != "defect" or found == {"defect"}
 
 
-def test_a_foot_under_the_ground_or_sliding_is_found(
+def test_a_foot_under_the_ground_or_sliding_and_a_turn_that_is_none_are_found(
     jump: DynamicTrajectory, model: RobotModel
 ) -> None:
     flying = int(np.flatnonzero(~jump.stance.any(axis=1))[3])
     jump.p_feet[flying, Leg.FR, 2] = 0.0
     jump.p_feet[-1, Leg.RL, 0] += 0.05
     assert broken(jump, model) == {"depth under ground", "slip"}
+    turn = pin.Quaternion(pin.exp3(np.array([0.0, 0.3, 0.0]))).coeffs()
+    jump.q[30, 3:7] = turn
+    assert "integrated rotation" in broken(jump, model)
 
 
 def test_a_foot_may_sink_in_the_step_in_which_it_pushes_off(
@@ -69,14 +72,6 @@ def test_a_foot_may_sink_in_the_step_in_which_it_pushes_off(
     assert broken(jump, model) == set()
     jump.p_feet[lifts + 1, Leg.FR, 2] = model.foot_radius - 0.009
     assert broken(jump, model) == {"depth under ground"}
-
-
-def test_a_turn_that_the_rates_do_not_make_is_found(
-    jump: DynamicTrajectory, model: RobotModel
-) -> None:
-    turn = pin.Quaternion(pin.exp3(np.array([0.0, 0.3, 0.0]))).coeffs()
-    jump.q[30, 3:7] = turn
-    assert "integrated rotation" in broken(jump, model)
 
 
 def test_a_reading_says_what_where_and_when(jump: DynamicTrajectory, model: RobotModel) -> None:

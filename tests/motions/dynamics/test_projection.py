@@ -39,19 +39,13 @@ def sway(plans: dict[str, DynamicTrajectory], model: RobotModel) -> DynamicTraje
     return nearest(written(SWAY, model), model, tolerance=WIDE)
 
 
-def test_a_sway_too_fast_for_friction_becomes_one_that_is_not(
+def test_a_sway_too_fast_for_friction_is_bent_by_what_a_look_at_its_path_tells(
     sway: DynamicTrajectory, model: RobotModel
 ) -> None:
     asked = written(SWAY, model)
     needed = np.gradient(np.gradient(asked.q[:, 1], asked.times), asked.times)
     assert np.abs(needed).max() > model.gravity  # four times what a cone of 0.5 and 0.5 g allow
     assert all(reading.is_kept for reading in audit(sway, model))
-
-
-def test_the_deviation_is_what_a_look_at_the_path_says(
-    sway: DynamicTrajectory, model: RobotModel
-) -> None:
-    asked = written(SWAY, model)
     wanted = np.array([np.interp(sway.times, asked.times, column) for column in asked.q.T]).T
     off = np.linalg.norm(sway.q[:, :3] - wanted[:, :3], axis=1)
     assert sway.position_deviation == pytest.approx(off.max(), abs=1e-3)
@@ -60,7 +54,7 @@ def test_the_deviation_is_what_a_look_at_the_path_says(
     assert sway.duration == pytest.approx(asked.times[-1])
 
 
-def test_what_can_be_done_is_done_as_written(
+def test_what_can_be_done_is_done_as_written_and_two_diagonal_feet_are_lifted(
     plans: dict[str, DynamicTrajectory], model: RobotModel
 ) -> None:
     slow = Timeline().body(y=0.03, roll=deg(5), over=0.5).home(over=0.5)
@@ -68,18 +62,13 @@ def test_what_can_be_done_is_done_as_written(
     assert plan.position_deviation < 0.003
     assert plan.angle_deviation < math.radians(0.5)
     assert plan.lag == 0.0
-
-
-def test_two_diagonal_feet_can_be_lifted(
-    plans: dict[str, DynamicTrajectory], model: RobotModel
-) -> None:
     plan = nearest(two_feet(model), model)
     assert all(reading.is_kept for reading in audit(plan, model))
     assert plan.position_deviation < 0.02
     assert (~plan.stance[:, [Leg.FL, Leg.RR]]).any(axis=0).all()
 
 
-def test_a_lag_is_told_if_it_explains_what_is_off(
+def test_a_lag_is_told_if_it_explains_what_is_off_and_too_far_is_refused(
     plans: dict[str, DynamicTrajectory], model: RobotModel
 ) -> None:
     line = Timeline().hold(0.3).body(y=0.03, over=0.4).home(over=0.4).hold(0.3)
@@ -90,11 +79,6 @@ def test_a_lag_is_told_if_it_explains_what_is_off(
     rng = np.random.default_rng(3)
     swaying = knots.q + 0.01 * rng.standard_normal(knots.q.shape)
     assert _lag_of(knots, replace(plan, q=swaying)) == 0.0
-
-
-def test_what_is_too_far_off_is_refused_with_how_far(
-    plans: dict[str, DynamicTrajectory], model: RobotModel
-) -> None:
     with pytest.raises(PlanNotFound, match="within 1 mm") as caught:
         nearest(written(SWAY, model), model, tolerance=Tolerance(0.001, 0.1))
     assert any(reason.startswith("trunk at") for reason in caught.value.reasons)

@@ -51,16 +51,23 @@ def test_every_knot_obeys_the_equations_of_motion(
         assert plan.q[row + 1] == pytest.approx(reached, abs=1e-9)
 
 
-def test_only_standing_feet_push_and_within_the_cone(plan: DynamicTrajectory) -> None:
+def test_only_standing_feet_push_and_the_trunk_turns_by_its_rates(plan: DynamicTrajectory) -> None:
     limits = PlanLimits()
     assert not plan.forces[~plan.stance].any()
     normal, tangential = plan.forces[..., 2], np.linalg.norm(plan.forces[..., :2], axis=-1)
     assert normal.min() > -1.0
     assert normal.max() < limits.force_max * SLACK
     assert (tangential <= SLACK * limits.friction * normal + 1.0).all()
+    turned = pin.Quaternion(plan.q[0, 3:7]).toRotationMatrix()
+    for dt, v in zip(np.diff(plan.times), plan.v[1:], strict=True):
+        turned = turned @ pin.exp3(dt * v[3:6])
+    end = pin.Quaternion(plan.q[-1, 3:7]).toRotationMatrix()
+    assert turned == pytest.approx(end, abs=1e-6)
 
 
-def test_torques_stay_below_the_motors_line(plan: DynamicTrajectory, model: RobotModel) -> None:
+def test_torques_stay_below_the_motors_line_until_the_end_of_a_step(
+    plan: DynamicTrajectory, model: RobotModel
+) -> None:
     for v in (plan.v[:-1, 6:], plan.v[1:, 6:]):
         lower, upper = model.motor.limits(v)
         assert (plan.tau >= lower).all()
@@ -69,10 +76,7 @@ def test_torques_stay_below_the_motors_line(plan: DynamicTrajectory, model: Robo
     assert (np.abs(plan.v[:, 6:]) <= model.speed_limits).all()
     assert (plan.q[:, 7:] >= model.q_lower).all()
     assert (plan.q[:, 7:] <= model.q_upper).all()
-
-
-def test_torques_meet_the_motors_line_until_the_end_of_a_step(model: RobotModel) -> None:
-    """A torque holds through its step; bounded by the speed in its middle it asked 2.05 there."""
+    # A torque holds through its step; bounded by the speed in its middle it asked 2.05 there.
     plan = solve(PhaseProblem(phase_builders.jump(yaw=math.radians(90.0), height=0.12)), model)
     limits = PlanLimits()
     middle = 0.5 * (plan.v[:-1, 6:] + plan.v[1:, 6:])
@@ -92,14 +96,6 @@ def test_feet_stand_still_or_are_above_the_ground(
                 assert after[2] > model.foot_radius - 0.005
 
 
-def test_the_trunk_turns_as_far_as_its_rates_say(plan: DynamicTrajectory) -> None:
-    turned = pin.Quaternion(plan.q[0, 3:7]).toRotationMatrix()
-    for dt, v in zip(np.diff(plan.times), plan.v[1:], strict=True):
-        turned = turned @ pin.exp3(dt * v[3:6])
-    end = pin.Quaternion(plan.q[-1, 3:7]).toRotationMatrix()
-    assert turned == pytest.approx(end, abs=1e-6)
-
-
 def test_a_plan_ends_at_rest_where_it_was_asked_to(
     plan: DynamicTrajectory, name: str, model: RobotModel
 ) -> None:
@@ -112,15 +108,12 @@ def test_a_plan_ends_at_rest_where_it_was_asked_to(
     assert plan.angle_deviation < math.radians(8.0)
 
 
-def test_a_jump_leaves_the_ground_by_what_was_asked(plans: dict[str, DynamicTrajectory]) -> None:
+def test_a_jump_leaves_the_ground_and_rearing_frees_the_front_feet(
+    plans: dict[str, DynamicTrajectory],
+) -> None:
     height = plans["jump"].p_feet[:, :, 2].min(axis=1).max() - plans["jump"].p_feet[0, 0, 2]
     assert height == pytest.approx(0.15, abs=0.02)
     assert not plans["jump"].stance.any(axis=1).all()
-
-
-def test_rearing_turns_the_trunk_and_frees_the_front_feet(
-    plans: dict[str, DynamicTrajectory],
-) -> None:
     rear = plans["rear"]
     pitch = [pin.rpy.matrixToRpy(pin.Quaternion(q[3:7]).matrix())[1] for q in rear.q]
     assert min(pitch) < math.radians(-24.0)
@@ -134,16 +127,13 @@ def test_the_same_question_has_the_same_answer(
     assert solve(PROBLEMS["lift"], model).to_bytes() == plans["lift"].to_bytes()
 
 
-def test_progress_is_told_and_a_budget_kept(
+def test_a_budget_is_kept_progress_told_and_a_near_miss_no_plan(
     plans: dict[str, DynamicTrajectory], model: RobotModel
 ) -> None:
     told: list[int] = []
     with pytest.raises(PlanNotFound, match=r"within 0\.05 s of processor time"):
         solve(PROBLEMS["jump"], model, budget=0.05, progress=lambda count, _: told.append(count))
     assert told == list(range(1, len(told) + 1))
-
-
-def test_a_near_miss_is_no_plan(plans: dict[str, DynamicTrajectory], model: RobotModel) -> None:
     problem = PhaseProblem(phase_builders.lift(), tolerance=Tolerance(position=1e-6))
     with pytest.raises(PlanNotFound, match=r"nearest one is off") as caught:
         solve(problem, model)
@@ -167,14 +157,13 @@ def jump(plans: dict[str, DynamicTrajectory]) -> Solved:
     return Solved(PROBLEMS["jump"], plans["jump"])
 
 
-def test_at_its_own_knots_a_plan_is_its_own_start(jump: Solved, model: RobotModel) -> None:
+def test_a_plan_starts_itself_at_its_own_knots_and_longer_ones_but_no_other_feet(
+    jump: Solved, model: RobotModel
+) -> None:
     x, tau = continued(jump, jump.problem, jump.plan.times, model)
     np.testing.assert_allclose(x[:, :19], jump.plan.q, atol=EXACT)
     np.testing.assert_allclose(x[:, 19:], jump.plan.v, atol=EXACT)
     np.testing.assert_array_equal(tau, jump.plan.tau)
-
-
-def test_a_longer_phase_takes_the_same_states_at_its_ends(jump: Solved, model: RobotModel) -> None:
     push, factor = jump.problem.phases[1], 1.5
     phases = list(jump.problem.phases)
     phases[1] = replace(push, duration=factor * push.duration)
@@ -183,9 +172,6 @@ def test_a_longer_phase_takes_the_same_states_at_its_ends(jump: Solved, model: R
     x, _ = continued(jump, PhaseProblem(tuple(phases)), times, model)
     rows = np.searchsorted(jump.plan.times, np.array([begin, end]) - EXACT)
     np.testing.assert_allclose(x[:, :19], jump.plan.q[rows], atol=1e-6)
-
-
-def test_other_feet_in_a_phase_are_no_start(jump: Solved, model: RobotModel) -> None:
     with pytest.raises(TimelineError, match=r"of 6 phases is no start for these 6: the same feet"):
         solve(PROBLEMS["rear"], model, start=jump)
 

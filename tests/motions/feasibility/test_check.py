@@ -52,11 +52,15 @@ def failed(report: FeasibilityReport) -> set[str]:
 # --- plans broken on purpose ----------------------------------------------------------------------
 
 
-def test_a_good_plan_passes(good: CompiledPlan, checker: FeasibilityChecker) -> None:
+def test_a_good_plan_passes_and_one_that_is_not_a_number_does_not(
+    good: CompiledPlan, checker: FeasibilityChecker
+) -> None:
     report = checker.check(good)
     assert report.ok, report.table()
     report.raise_if_infeasible()
     assert all(finding.margin >= 0.0 for finding in report.margins.values())
+    report = checker.check(DoctoredPlan(good, aside=float("nan")))
+    assert not report.ok
 
 
 def test_a_joint_beyond_its_limit_is_found_at_its_worst_instant(
@@ -153,13 +157,6 @@ def test_causes_come_before_what_follows_from_them(
     assert report.failures[0].time > 1.0 > min(finding.time for finding in report.failures)
 
 
-def test_a_plan_that_is_not_a_number_is_infeasible(
-    good: CompiledPlan, checker: FeasibilityChecker
-) -> None:
-    report = checker.check(DoctoredPlan(good, aside=float("nan")))
-    assert not report.ok
-
-
 # --- timelines that the robot cannot do -----------------------------------------------------------
 
 AWAY = {
@@ -219,13 +216,25 @@ def test_a_foot_that_moves_along_the_ground_is_found_and_one_that_rises_on_its_w
     assert finding.value == pytest.approx(0.05, abs=3e-3)  # and the last bit of the way down
 
 
-def test_legs_that_cross_are_found(checker: FeasibilityChecker) -> None:
+def test_legs_that_cross_or_end_elsewhere_are_found_and_no_balance_has_no_number(
+    checker: FeasibilityChecker,
+) -> None:
     crossing = (
         Timeline().foot("FR", z=0.10, over=0.8).foot("FR", y=0.26, z=0.04, over=0.8).home(over=1.0)
     )
     (finding,) = [f for f in checker.check(crossing).failures if f.check == "self-collision"]
     assert "FL" in finding.subject
     assert "FR" in finding.subject
+    report = checker.check(AWAY["balance"])
+    (finding,) = [f for f in report.failures if f.check == "balance"]
+    assert "nan" not in str(finding)
+    assert "two feet cannot balance the trunk" in str(finding)
+    assert "nan" not in report.table()
+    for line in (
+        Timeline(entry=Posture.LIE).body(z=0.0, roll=0.01, over=1.0),
+        Timeline(exit=Posture.SIT).body(z=-0.05, over=1.0).home(over=1.0),
+    ):
+        assert "entry and exit" in failed(checker.check(line))
 
 
 def test_a_name_of_the_library_may_be_checked_and_nothing_else(checker: FeasibilityChecker) -> None:
@@ -235,24 +244,6 @@ def test_a_name_of_the_library_may_be_checked_and_nothing_else(checker: Feasibil
     for ask in (FeasibilityChecker.check, FeasibilityChecker.evaluate, FeasibilityChecker.plan):
         with pytest.raises(CommandError, match=r"motion must be a name of the library.* got 3"):
             inspect.unwrap(ask)(checker, 3)  # past the checks of types
-
-
-def test_a_moment_without_balance_is_told_without_a_number(checker: FeasibilityChecker) -> None:
-    report = checker.check(AWAY["balance"])
-    (finding,) = [f for f in report.failures if f.check == "balance"]
-    assert "nan" not in str(finding)
-    assert "two feet cannot balance the trunk" in str(finding)
-    assert "nan" not in report.table()
-
-
-def test_a_motion_that_starts_lying_or_ends_elsewhere_is_refused(
-    checker: FeasibilityChecker,
-) -> None:
-    for line in (
-        Timeline(entry=Posture.LIE).body(z=0.0, roll=0.01, over=1.0),
-        Timeline(exit=Posture.SIT).body(z=-0.05, over=1.0).home(over=1.0),
-    ):
-        assert "entry and exit" in failed(checker.check(line))
 
 
 @pytest.mark.parametrize(("exit", "way"), [(Posture.STAND, "home()"), (Posture.SIT, "'sit')")])
@@ -281,7 +272,7 @@ def test_the_feet_of_a_resting_robot_carry_its_weight_with_the_torques_of_static
     assert path.p_com[0, 2] == pytest.approx(STAND_HEIGHT, abs=EXACT)
 
 
-def test_the_trajectory_puts_the_com_and_the_feet_where_the_plan_wants_them(
+def test_a_trajectory_is_where_the_plan_wants_it_and_obeys_the_equations_of_motion(
     good: CompiledPlan, model: RobotModel
 ) -> None:
     path = trajectory_of(good, model)
@@ -293,10 +284,6 @@ def test_the_trajectory_puts_the_com_and_the_feet_where_the_plan_wants_them(
         assert feet[stands] == pytest.approx(path.p_feet[0, stands], abs=EXACT)
         raised = ~np.repeat(stands, 3)
         assert path.q[row, 7:][raised] == pytest.approx(reference.q_joints[raised], abs=EXACT)
-
-
-def test_equations_of_motion_hold_along_a_trajectory(good: CompiledPlan, model: RobotModel) -> None:
-    path = trajectory_of(good, model)
     forces, last = forces_of(path, model), len(path.times) - 1
     for row in range(0, len(path.times), 40):
         near = [min(max(k, 0), last) for k in (row - 1, row, row + 1)]
@@ -316,6 +303,9 @@ def test_a_table_fits_80_columns_and_names_every_check(
     lines = report.table().splitlines()
     assert max(map(len, lines)) <= 80
     assert all(any(line.startswith(check) for line in lines) for check in report.margins)
+    for series in report.series:
+        if (finding := report.margins.get(series.check)) is not None:
+            assert np.nanmin(series.least_margins()) == pytest.approx(finding.margin)
     assert "can do it" in lines[-2]
     assert lines[-1].startswith("Chance that it is done so: ")
 
@@ -337,7 +327,7 @@ def test_it_has_the_report_that_check_gives(
     assert high_five.report.as_dict() == checker.check("high_five").as_dict()
 
 
-def test_at_rest_the_forces_point_up_and_carry_the_weight(
+def test_at_rest_forces_carry_the_weight_and_the_com_keeps_its_margin_over_the_feet(
     checker: FeasibilityChecker, high_five: CheckedMotion
 ) -> None:
     run = high_five.recording()
@@ -349,12 +339,6 @@ def test_at_rest_the_forces_point_up_and_carry_the_weight(
     np.testing.assert_allclose(run.foot_forces[~run.stance], 0.0, atol=_UNLOADED)
     assert not run.stance[held, Leg.FR]
     assert run.stance[held].sum() == 3
-
-
-def test_the_margin_is_that_of_the_com_over_the_standing_feet(
-    checker: FeasibilityChecker, high_five: CheckedMotion
-) -> None:
-    run = high_five.recording()
     for row in (0, len(run.time) // 2, -1):
         com, feet = checker.model.forward_kinematics(run.q[row])
         expected = support_margin(feet[run.stance[row], :2], com[:2])
@@ -378,14 +362,13 @@ def test_two_raised_feet_have_no_margin(checker: FeasibilityChecker) -> None:
 SWAY = Timeline().body(y=0.03, over=0.5).home(over=0.5)
 
 
-def test_the_feet_carry_the_payload_too(model: RobotModel) -> None:
+def test_feet_carry_a_payload_too_that_moves_the_centre_of_mass_over_them(
+    model: RobotModel,
+) -> None:
     world = World(payload=3.0, mass_scale=1.05)
     checked = FeasibilityChecker(model, world=world).evaluate(SWAY)
     weight = (1.05 * model.mass + 3.0) * model.gravity
     assert checked.forces.contact[0, :, 2].sum() == pytest.approx(weight, abs=0.05)
-
-
-def test_a_payload_in_front_moves_the_centre_of_mass_over_the_feet(model: RobotModel) -> None:
     line = Timeline().foot("FR", z=0.06, over=0.6).hold(0.2).home(over=0.6)
     margins = [
         FeasibilityChecker(model, world=world).check(line).margins["support"].value
@@ -395,16 +378,13 @@ def test_a_payload_in_front_moves_the_centre_of_mass_over_the_feet(model: RobotM
     assert 0.01 < margins[0] - margins[1] < 0.05
 
 
-def test_what_is_uncertain_counts_at_its_worst(model: RobotModel) -> None:
+def test_what_is_uncertain_of_mass_and_floor_counts_at_its_worst(model: RobotModel) -> None:
     worlds = (World(), World(mass_uncertainty=0.2), World(mass_scale=1.2))
     torques = [
         FeasibilityChecker(model, world=world).check(SWAY).margins["torque"].value
         for world in worlds
     ]
     assert torques[0] < torques[1] == pytest.approx(torques[2], rel=1e-9)
-
-
-def test_what_is_uncertain_of_the_floor_counts_at_its_worst(model: RobotModel) -> None:
     world = World(friction=0.5, friction_uncertainty=0.2)
     margin = FeasibilityChecker(model, world=world).check(SWAY).margins["friction"]
     assert margin.limit == pytest.approx(0.4)
@@ -423,7 +403,7 @@ def test_joint_friction_asks_more_of_the_motors(model: RobotModel) -> None:
     assert np.abs(more[v == 0.0]).max(initial=0.0) == 0.0
 
 
-def test_a_slippery_floor_is_refused_and_named() -> None:
+def test_a_slippery_floor_is_refused_and_a_world_out_of_range_told() -> None:
     usual, slippery = check("wiggle"), check("wiggle", friction=0.05)
     assert usual.ok
     assert "holds for" not in usual.table()
@@ -432,6 +412,8 @@ def test_a_slippery_floor_is_refused_and_named() -> None:
     loaded = check(SWAY, payload=3.0, world=World(friction=0.6))
     assert loaded.world == World(friction=0.6, payload=3.0)
     assert loaded.as_dict()["world"]["payload"] == 3.0
+    with pytest.raises(ConfigError, match=r"World\.friction must be between 0\.0001 and 2, got 9"):
+        check(SWAY, friction=9.0)
 
 
 def test_the_table_is_narrow_in_every_world_and_says_what_no_limit_counts_with() -> None:
@@ -448,11 +430,6 @@ def test_the_table_is_narrow_in_every_world_and_says_what_no_limit_counts_with()
     assert str(world) in text.replace("\n", " ")
     assert "simulated only" in text
     assert "simulated only" not in check(SWAY, payload=2.0).table()
-
-
-def test_a_world_out_of_range_is_told() -> None:
-    with pytest.raises(ConfigError, match=r"World\.friction must be between 0\.0001 and 2, got 9"):
-        check(SWAY, friction=9.0)
 
 
 def test_a_load_that_brings_the_com_inside_does_not_help_a_controller_that_feels_it() -> None:

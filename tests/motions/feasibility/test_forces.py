@@ -1,5 +1,6 @@
 """Contact forces of a motion: what they must be, and what another solver says they are."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -342,29 +343,31 @@ def to_and_fro(channel: str, size: float, over: float, times: int = 2) -> Timeli
     return line.home(over=over)
 
 
-def test_a_twist_that_slips_is_refused(checker: FeasibilityChecker) -> None:
+def test_a_twist_that_slips_and_a_fast_roll_that_creeps_are_refused(
+    checker: FeasibilityChecker,
+) -> None:
     # 69 mm on friction 0.5 in MuJoCo; the pyramid's diagonal gave 0.64.
     report = checker.check(to_and_fro("yaw", 0.268, 0.252))
     assert {finding.check for finding in report.failures} >= {"slip"}
+    # 13.1 mm in MuJoCo, with friction 0.5 and with 2; it needs no more than 0.07.
+    line = to_and_fro("roll", 0.371, 0.130, times=4)
+    slip = checker.check(line).margins["slip"]
+    assert slip.value == pytest.approx(0.0131, rel=0.15)
 
 
-@pytest.mark.parametrize(("size", "over"), [(0.016, 0.28), (0.022, 0.35)])
-def test_a_sway_that_slips_by_less_than_a_millimetre_passes(
-    checker: FeasibilityChecker, size: float, over: float
-) -> None:
+@pytest.mark.parametrize(
+    ("channel", "size", "over", "slips"),
     # 0.3 and 0.5 mm; the controller's share of the load needs 0.56 and 0.48 for a moment.
-    report = checker.check(to_and_fro("y", size, over))
-    assert report.ok, report.table()
-    assert report.margins["slip"].value < 0.005
-
-
-@pytest.mark.parametrize(("size", "over"), [(0.25, 0.2), (0.286, 0.247)])
-def test_a_quick_roll_that_is_done_passes(
-    checker: FeasibilityChecker, size: float, over: float
-) -> None:
+    [("y", 0.016, 0.28, 0.005), ("y", 0.022, 0.35, 0.005)]
     # Refused for the trunk's turning alone (continuity), though it slips 1.4 mm.
-    report = checker.check(to_and_fro("roll", size, over))
+    + [("roll", 0.25, 0.2, math.inf), ("roll", 0.286, 0.247, math.inf)],
+)
+def test_a_sway_or_a_roll_that_hardly_slips_passes(
+    checker: FeasibilityChecker, channel: str, size: float, over: float, slips: float
+) -> None:
+    report = checker.check(to_and_fro(channel, size, over))
     assert report.ok, report.table()
+    assert report.margins["slip"].value < slips
 
 
 def test_feet_creep_by_what_contacts_leave_out(checker: FeasibilityChecker) -> None:
@@ -374,13 +377,6 @@ def test_feet_creep_by_what_contacts_leave_out(checker: FeasibilityChecker) -> N
         J_a = model.snapshot(state_at(path, row)).J_contacts @ path.a[row]
         np.testing.assert_allclose(found[row], -J_a[:, :2] / CONTACT_RATE, atol=1e-12)
     assert np.abs(found).max() > 0.01
-
-
-def test_a_fast_roll_that_creeps_is_refused_on_any_floor(checker: FeasibilityChecker) -> None:
-    # 13.1 mm in MuJoCo, with friction 0.5 and with 2; it needs no more than 0.07.
-    line = to_and_fro("roll", 0.371, 0.130, times=4)
-    slip = checker.check(line).margins["slip"]
-    assert slip.value == pytest.approx(0.0131, rel=0.15)
 
 
 def test_an_unloading_for_a_moment_passes_and_a_flight_does_not(
@@ -401,7 +397,9 @@ def test_a_joint_at_its_stop_is_refused_by_what_it_moves(checker: FeasibilityChe
     def nose_up(angle: float, z: float) -> Timeline:
         return Timeline().body(pitch=-deg(angle), z=z, over=1.0).hold(0.3).home(over=1.0)
 
-    little = checker.check(nose_up(22.0, 0.04)).margins["joint position"]
+    report = checker.check(nose_up(22.0, 0.04))
+    little = report.margins["joint position"]
+    assert little not in report.failures
     assert little.value > little.limit
     assert little.margin == 0.0
     assert checker.check(nose_up(28.0, 0.04)).margins["joint position"].margin < 0.0

@@ -23,7 +23,7 @@ def test_a_wider_margin_never_lowers_the_chance(slip: float, torque: float, more
     assert MODEL.probability({"slip": slip, "torque": torque + more}) >= before
 
 
-def test_causes_multiply_and_what_was_not_checked_is_no_risk() -> None:
+def test_causes_multiply_what_no_fit_has_seen_is_yes_or_no_and_the_leak_is_left() -> None:
     margins = {"slip": 0.01 * math.sinh(0.9), "torque": 2.0 * math.sinh(-1.0)}
     chances = MODEL.chances(margins)
     assert chances == pytest.approx({"slip": 1 / (1 + math.exp(-1)), "torque": 0.5})
@@ -31,13 +31,7 @@ def test_causes_multiply_and_what_was_not_checked_is_no_risk() -> None:
     assert MODEL.probability(margins) == pytest.approx(rest * math.prod(chances.values()))
     assert MODEL.probability({"slip": math.nan}) == pytest.approx(rest)
     assert MODEL.probability({"slip": -math.inf}) == 0.0
-
-
-def test_a_check_that_no_fit_has_seen_is_a_yes_or_no() -> None:
     assert MODEL.chances({"a": 1e-9, "b": 0.0, "c": -1e-9}) == {"a": 1.0, "b": 1.0, "c": 0.0}
-
-
-def test_the_leak_is_what_is_left_where_a_margin_says_no_but_not_to_what_no_fit_has_seen() -> None:
     leaky = replace(MODEL, leak=0.1)
     rest = 1 / (1 + math.exp(-3))
     assert leaky.probability({"slip": -math.inf}) == pytest.approx(0.1 * rest)

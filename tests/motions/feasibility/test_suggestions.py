@@ -77,10 +77,12 @@ def test_each_kind_is_found_where_it_helps() -> None:
     assert set(_suggested(SWAY)) == {"tempo and amplitude"}
 
 
-def test_nothing_is_suggested_for_what_is_feasible_or_for_what_cannot_be_mended() -> None:
+def test_nothing_is_suggested_for_what_is_feasible_hopeless_or_a_plan() -> None:
     assert suggest(FEASIBLE, checker=CHECKER) == ()
     hopeless = Timeline().leg("FL", hip=0.0, thigh=-2.0, calf=-0.2, over=0.5).hold(0.5)
     assert suggest(hopeless, checker=CHECKER) == ()
+    with pytest.raises(CommandError, match="motion as it is written"):
+        suggest(compile_timeline(FEASIBLE, CHECKER.model), checker=CHECKER)
 
 
 def test_the_nearest_lower_jump_is_found_in_few_tries(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -95,11 +97,6 @@ def test_the_nearest_lower_jump_is_found_in_few_tries(monkeypatch: pytest.Monkey
     (only,) = suggest(Timeline().jump(height=0.4), checker=CHECKER)
     assert (only.kind, only.call) == ("jump", ".scale_jumps(0.45)")
     assert len(tried) < 10
-
-
-def test_a_plan_has_no_calls_to_change() -> None:
-    with pytest.raises(CommandError, match="motion as it is written"):
-        suggest(compile_timeline(FEASIBLE, CHECKER.model), checker=CHECKER)
 
 
 def test_a_trunk_that_is_lower_all_along_comes_back_in_the_last_move() -> None:

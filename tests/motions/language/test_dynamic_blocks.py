@@ -50,27 +50,9 @@ def test_a_jump_flies_and_lands_where_it_says_and_time_goes_on() -> None:
     assert max(one.feet[Leg.RR][2] for one in flown) == pytest.approx(0.1)
 
 
-def test_the_time_in_the_air_may_be_given_in_beats() -> None:
+def test_time_in_the_air_may_be_beats_and_hops_come_down_on_them() -> None:
     flown = [one for one in phases(Timeline().bpm(120).jump(flight=0.8)) if not one.stance]
     assert sum(one.duration for one in flown) == pytest.approx(0.4)
-
-
-def test_a_spin_jump_ends_turned_and_its_mirror_turned_the_other_way() -> None:
-    left = phases(Timeline().spin_jump(deg(90)))
-    right = phases(Timeline().spin_jump(deg(90)).mirror())
-    assert left[-1].body is not None
-    assert left[-1].body[5] == pytest.approx(deg(90))
-    assert right == phases(Timeline().spin_jump(deg(-90)))
-
-
-def test_lifted_feet_are_the_others_in_the_mirror() -> None:
-    line = Timeline().lift(("FL", "RR"))
-    in_air = [frozenset(LEGS) - one.stance for one in phases(line)]
-    assert {Leg.FL, Leg.RR} in in_air
-    assert {Leg.FR, Leg.RL} in [frozenset(LEGS) - one.stance for one in phases(line.mirror())]
-
-
-def test_hops_come_down_on_the_beats_whatever_the_tempo() -> None:
     for tempo in (90.0, 113.0, 120.0):
         beat = 60.0 / tempo
         line = Timeline().bpm(tempo).hold(3).hop(3, height=0.04, period=1)
@@ -80,26 +62,37 @@ def test_hops_come_down_on_the_beats_whatever_the_tempo() -> None:
         assert line.end / beat == pytest.approx(round(line.end / beat), abs=_TIE)
 
 
-def test_phases_that_follow_each_other_are_one_block_and_a_pause_parts_them() -> None:
+def test_in_the_mirror_a_spin_turns_the_other_way_and_other_feet_are_lifted() -> None:
+    left = phases(Timeline().spin_jump(deg(90)))
+    right = phases(Timeline().spin_jump(deg(90)).mirror())
+    assert left[-1].body is not None
+    assert left[-1].body[5] == pytest.approx(deg(90))
+    assert right == phases(Timeline().spin_jump(deg(-90)))
+    line = Timeline().lift(("FL", "RR"))
+    in_air = [frozenset(LEGS) - one.stance for one in phases(line)]
+    assert {Leg.FL, Leg.RR} in in_air
+    assert {Leg.FR, Leg.RL} in [frozenset(LEGS) - one.stance for one in phases(line.mirror())]
+
+
+def test_phases_in_a_row_are_one_block_and_what_is_repeated_is_the_same_later() -> None:
     crouched = Timeline().phase(0.3, body={"z": -0.05}).phase(0.2)
     assert len(phases(crouched)) == 2
     assert len(blocks(crouched.hold(0.1).phase(0.2))) == 2
     assert len(blocks(Timeline().jump().phase(0.2))) == 2
-
-
-def test_what_is_repeated_is_the_same_later() -> None:
     first, second = blocks(Timeline().jump(x=0.2).repeat(2))
     assert first.phases == second.phases
     assert second.start == pytest.approx(first.end)
 
 
-def test_a_pounce_is_a_jump_from_a_low_crouch() -> None:
+def test_a_pounce_is_a_jump_from_a_low_crouch_and_what_follows_counts_from_its_landing() -> None:
     first, *others = phases(Timeline().pounce(0.3, crouch=0.8))
     assert first.duration == pytest.approx(0.8)
     assert first.body is not None
     assert first.body[2] < -0.06
     assert others[-1].body is not None
     assert others[-1].body[0] == pytest.approx(0.3)
+    line = Timeline().jump(x=0.3, yaw=deg(90)).jump(x=0.2).walk(x=0.1)
+    assert line.end_pose == pytest.approx((0.3, 0.3, deg(90)), abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -145,8 +138,3 @@ def test_what_cannot_be_meant_is_refused_in_words(
 ) -> None:
     with pytest.raises(TimelineError, match=message):
         write()
-
-
-def test_what_follows_a_jump_counts_from_where_it_lands() -> None:
-    line = Timeline().jump(x=0.3, yaw=deg(90)).jump(x=0.2).walk(x=0.1)
-    assert line.end_pose == pytest.approx((0.3, 0.3, deg(90)), abs=1e-6)

@@ -27,15 +27,12 @@ def test_a_swing_begins_and_ends_at_rest_and_rises_to_its_height() -> None:
     assert way[-1] - NOMINAL[Leg.FL] == pytest.approx([0.1, 0.0, 0.0], abs=EXACT)
 
 
-def test_the_frame_goes_evenly_while_feet_start_and_stop() -> None:
+def test_the_frame_goes_evenly_and_turns_on_beyond_half_a_turn() -> None:
     line = Timeline().walk(0.96, gait="trot")
     times = np.linspace(0.0, line.end, 2000)
     x = Footing(line, NOMINAL).frames(times)[:, 0]
     speed = np.gradient(x, times)[(x > 0.24) & (x < 0.72)]
     assert np.ptp(speed) / 2 < RIPPLE * speed.mean()
-
-
-def test_the_yaw_of_the_frame_goes_on_beyond_half_a_turn() -> None:
     line = Timeline().turn(deg(270), gait="trot")
     yaw = Footing(line, NOMINAL).frames(np.linspace(0.0, line.end, 500))[:, 2]
     assert yaw[-1] == pytest.approx(deg(270))

@@ -11,7 +11,7 @@ from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.rotations import yaw_rotation
 from motions import FeasibilityChecker, Timeline, deg, load_motion
 from motions.language.footing import Footing
-from motions.language.keys import JointKey, PhaseKey
+from motions.language.keys import BodyKey, JointKey, PhaseKey
 from motions.plan.trajectory import trajectory_of
 from motions.postures import standing_feet
 from tests.motions.plans import MODEL, curves_at, plan_of
@@ -31,7 +31,7 @@ def written(line: Timeline) -> list[str]:
 # --- shapes -------------------------------------------------------------------------------
 
 
-def test_a_path_passes_its_points_without_a_stop() -> None:
+def test_a_path_passes_its_points_evenly_without_a_stop() -> None:
     points = [{"x": 0.02, "z": -0.02}, {"x": 0.03, "z": 0.0}, {"x": 0.0, "z": 0.0}]
     plan = plan_of(Timeline().body_path(points, over=2.4, times=[0.6, 1.2, 2.4]))
     start = plan.at(0.0).body.p_world
@@ -41,9 +41,6 @@ def test_a_path_passes_its_points_without_a_stop() -> None:
         assert body.p_world[0] - start[0] == pytest.approx(point["x"], abs=0.005)
     assert np.linalg.norm(plan.at(0.6).body.v_world) > 0.01
     assert np.linalg.norm(plan.at(2.4).body.v_world) < NEAR
-
-
-def test_points_without_times_are_evenly_spaced() -> None:
     points = [{"pitch": deg(6)}, {"pitch": deg(-6)}, {"pitch": 0.0}]
     even = Timeline().body_path(points, over=3.0)
     assert even.keys == Timeline().body_path(points, over=3.0, times=[1.0, 2.0, 3.0]).keys
@@ -101,12 +98,9 @@ def test_a_slower_motion_passes_the_same_places_later(name: str) -> None:
         assert curves_at(slow, 2 * t)[0] == pytest.approx(curves_at(fast, t)[0], abs=2e-3)
 
 
-def test_beats_last_longer_in_a_slower_motion() -> None:
+def test_slower_beats_last_longer_and_half_the_amplitude_is_half_the_way() -> None:
     line = Timeline().bpm(120).body(z=-0.02, over=1).scale_time(2.0).hold(1)
     assert line.end == pytest.approx(2.0)
-
-
-def test_half_the_amplitude_is_half_the_way() -> None:
     whole, half = (curves_at(plan_of(line), 0.6)[0] for line in (NOD, NOD.scale(0.5)))
     assert half[4] == pytest.approx(0.5 * whole[4], abs=NEAR)
     assert WAVE.scale(0.5).keys != WAVE.keys
@@ -123,6 +117,9 @@ def test_a_trunk_that_is_shifted_in_height_keeps_its_own_moves_of_height() -> No
     path = Timeline().body_path([{"z": low}, {"z": middle}], over=1.0).home(over=1.0)
     moved = Timeline().body_path([{"z": middle}, {"z": high}], over=1.0).home(over=1.0)
     assert written(path.shift_height(low)) == written(moved)
+    both = Timeline().body(yaw=0.1, over=0.5).also().body(pitch=0.1, over=1.0).home(over=1.0)
+    heights = [key for key in both.shift_height(low).in_order(BodyKey) if key.channel == "z"]
+    assert [(key.start, key.end) for key in heights] == [(0.0, 1.0), (1.0, 2.0)]
 
 
 def test_longer_shifts_delay_what_follows_and_stretch_what_goes_on_meanwhile() -> None:
@@ -160,7 +157,7 @@ def test_smaller_jumps_are_lower_and_shorter_and_what_follows_comes_sooner() -> 
         NOD.scale_jumps(0.5)
 
 
-def test_backwards_a_motion_passes_the_same_places_in_turn() -> None:
+def test_backwards_a_motion_passes_the_same_places_and_twice_is_itself() -> None:
     path = Timeline().body_path([{"x": 0.02}, {"x": -0.02}, {"x": 0.0}], over=2.0)
     for line in (NOD, WAVE, path):
         there, back = plan_of(line), plan_of(line.reverse())
@@ -168,16 +165,10 @@ def test_backwards_a_motion_passes_the_same_places_in_turn() -> None:
             mirrored = curves_at(back, there.duration - t)[0]
             assert mirrored == pytest.approx(curves_at(there, t)[0], abs=BALANCE)
         assert FeasibilityChecker(MODEL).check(line.reverse()).ok
-
-
-def test_backwards_entry_and_exit_change_places() -> None:
     down = Timeline(exit=Posture.SIT).posture("sit", over=1.5)
     up = down.reverse()
     assert (up.entry, up.exit) == (Posture.SIT, Posture.STAND)
     assert down.then(up).end == pytest.approx(3.0)
-
-
-def test_backwards_twice_is_the_motion_itself() -> None:
     for line in (NOD, WAVE):
         twice = line.reverse().reverse()
         assert written(twice) == written(line)

@@ -51,10 +51,13 @@ def played(plan: CompiledPlan) -> tuple[Anchor, np.ndarray]:
 # --- single steps ---------------------------------------------------------------------------------
 
 
-def test_a_foot_that_steps_lands_where_the_step_says_and_the_others_stay() -> None:
+def test_a_foot_lands_where_its_step_says_and_is_put_down_where_it_stands_by_then() -> None:
     feet = last_feet(Timeline().step("FL", 0.06, 0.03, over=0.6).home(over=0.8))
     moved = np.array([[0.06, 0.03, 0.0], *np.zeros((3, 3))])
     assert feet - NOMINAL == pytest.approx(moved, abs=EXACT)
+    line = Timeline().step("FR", 0.05, -0.02, over=0.5)
+    line = line.foot("FR", x=0.03, z=0.08, over=0.5).down("FR", over=0.5).home(over=0.8)
+    assert last_feet(line)[Leg.FR] - NOMINAL[Leg.FR] == pytest.approx([0.05, -0.02, 0], abs=EXACT)
 
 
 def test_a_robot_that_steps_lands_the_foot_where_the_step_says() -> None:
@@ -64,7 +67,7 @@ def test_a_robot_that_steps_lands_the_foot_where_the_step_says() -> None:
     assert np.linalg.norm((feet[Leg.FL] - planned)[:2]) < PLACED
 
 
-def test_home_is_above_the_feet_as_they_stand_by_then() -> None:
+def test_home_and_offsets_count_from_the_feet_as_they_stand_by_then() -> None:
     line = Timeline()
     for leg in LEGS:
         line = line.step(leg, 0.05, over=0.4)
@@ -72,9 +75,6 @@ def test_home_is_above_the_feet_as_they_stand_by_then() -> None:
     start, end = plan.at(0.0).body.p_world, plan.at(plan.duration).body.p_world
     assert plan.end_pose == pytest.approx((0.05, 0.0, 0.0), abs=EXACT)
     assert end - start == pytest.approx([0.05, 0.0, 0.0], abs=EXACT)
-
-
-def test_offsets_count_in_the_heading_of_the_feet_as_they_stand_by_then() -> None:
     line = Timeline().turn(deg(90), gait="trot").body(x=0.03, over=0.5)
     line = line.foot("FR", x=0.05, z=0.08, over=0.5)
     plan, turned = plan_of(line), yaw_rotation(deg(90)) @ np.array([0.05, 0.0, 0.08])
@@ -83,19 +83,10 @@ def test_offsets_count_in_the_heading_of_the_feet_as_they_stand_by_then() -> Non
     assert raised - place == pytest.approx(turned, abs=EXACT)
 
 
-def test_a_foot_that_has_stepped_is_put_down_where_it_stands_by_then() -> None:
-    line = Timeline().step("FR", 0.05, -0.02, over=0.5)
-    line = line.foot("FR", x=0.03, z=0.08, over=0.5).down("FR", over=0.5).home(over=0.8)
-    assert last_feet(line)[Leg.FR] - NOMINAL[Leg.FR] == pytest.approx([0.05, -0.02, 0], abs=EXACT)
-
-
-def test_a_step_may_go_round_the_middle_of_the_feet() -> None:
+def test_a_step_may_go_round_the_feet_but_not_out_of_reach() -> None:
     line = Timeline().step("RR", yaw=deg(10), over=0.5).home(over=0.8)
     p, turned = NOMINAL[Leg.RR], last_feet(line)[Leg.RR]
     assert np.arctan2(turned[1], turned[0]) - np.arctan2(p[1], p[0]) == pytest.approx(deg(10))
-
-
-def test_a_step_out_of_reach_is_a_finding_and_no_near_miss() -> None:
     assert "way of a foot" in failures(Timeline().step("FL", 0.5, over=1.0).home(over=0.8))
 
 
@@ -132,16 +123,13 @@ def test_a_way_ends_where_it_says_on_feet_below_their_hips_and_is_feasible(
     assert plan.at(plan.duration).p_world_feet == pytest.approx(square, abs=EXACT)
 
 
-def test_a_path_without_headings_heads_where_it_goes() -> None:
+def test_paths_head_where_they_go_and_the_next_motion_goes_on_from_there() -> None:
     line = Timeline().path([(0.3, 0.0), (0.5, 0.2), (0.5, 0.5)], gait="trot")
     plan = plan_of(line)
     yaw = plan.end_pose[2]
     rate = trajectory_of(plan, MODEL).q[:, :2]
     way = rate[-60] - rate[-100]
     assert yaw == pytest.approx(np.arctan2(way[1], way[0]), abs=0.3)
-
-
-def test_the_next_motion_goes_on_where_this_one_has_ended() -> None:
     first = Timeline().walk(0.2, 0.1, deg(60), gait="trot")
     line = first.then(first, Timeline().body(z=-0.03, over=0.5).home(over=0.5))
     p, yaw = np.array([0.2, 0.1, 0.0]), deg(60)
@@ -150,14 +138,11 @@ def test_the_next_motion_goes_on_where_this_one_has_ended() -> None:
     assert CHECKER.check(line).ok
 
 
-def test_a_mirrored_walk_ends_across() -> None:
+def test_a_walk_is_mirrored_and_scaled_in_time_and_size() -> None:
     line = Timeline().walk(0.2, 0.1, deg(30)).step("FL", 0.03, 0.02, over=0.5).home(over=1.0)
     x, y, yaw = line.end_pose
     assert line.mirror().end_pose == pytest.approx((x, -y, -yaw), abs=EXACT)
     assert line.mirror().mirror() == line
-
-
-def test_steps_are_scaled_in_time_and_size() -> None:
     line = Timeline().hold(0.5).walk(0.2, gait="trot")
     assert line.scale_time(2.0).end == pytest.approx(2.0 * line.end)
     assert line.scale_time(2.0).end_pose == pytest.approx(line.end_pose, abs=EXACT)
@@ -173,13 +158,10 @@ def test_with_a_tempo_feet_land_on_beats_or_halves_of_them(gait: str, tempo: flo
     assert beats == pytest.approx(round(beats))
 
 
-def test_a_walk_takes_as_long_as_it_is_told() -> None:
+def test_a_walk_takes_its_time_while_the_trunk_sways_and_leans() -> None:
     line = Timeline().hold(0.5).walk(0.24, over=8.0)
     assert line.end == pytest.approx(8.5)
     assert CHECKER.check(line).ok
-
-
-def test_the_trunk_sways_and_leans_while_the_feet_step() -> None:
     walk = Timeline().walk(0.24)
     lean = Timeline().body(roll=deg(6), z=-0.03, over=walk.end / 2).home(over=walk.end / 2)
     line = Timeline().together(walk, lean)
@@ -190,28 +172,22 @@ def test_the_trunk_sways_and_leans_while_the_feet_step() -> None:
 # --- the check ------------------------------------------------------------------------------------
 
 
-def test_a_trot_that_stays_long_on_two_feet_is_refused() -> None:
+def test_a_trot_long_on_two_feet_or_off_their_line_is_refused() -> None:
     line = Timeline().walk(0.2, gait="trot")
     assert not failures(line)
     assert "support" in failures(line.scale_time(2.0))
-
-
-def test_a_trot_whose_trunk_leaves_the_line_of_its_feet_is_refused() -> None:
     beside = Timeline().body(y=0.05, over=0.5)
     line = beside.together(Timeline(balance=False).walk(0.2, gait="trot")).home(over=0.8)
     assert "support of ZMP" in failures(line)
 
 
-def test_the_report_says_where_a_motion_ends_if_it_goes_anywhere() -> None:
+def test_a_motion_that_goes_anywhere_says_where_it_ends_above_its_feet() -> None:
     line = Timeline().walk(0.2, gait="trot")
     report = CHECKER.check(line)
     assert report.table().endswith("It ends at x 0.200 m, y 0.000 m, turned by 0.0 deg.")
     assert report.as_dict()["end_pose"] == pytest.approx(line.end_pose, abs=EXACT)
     stays = Timeline().body(z=-0.01, over=0.5).home(over=0.5)
     assert "It ends" not in CHECKER.check(stays).table()
-
-
-def test_a_motion_ends_above_its_feet_or_is_refused() -> None:
     assert "entry and exit" in failures(Timeline().walk(0.1, gait="trot").body(x=0.05, over=0.5))
 
 

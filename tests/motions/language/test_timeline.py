@@ -29,13 +29,10 @@ NEAR = 1e-6  # m, rad; of a spline through samples, at a sample
 # --- the cursor -----------------------------------------------------------------------------------
 
 
-def test_calls_follow_each_other_and_holds_take_time() -> None:
+def test_calls_follow_each_other_and_at_puts_the_cursor_anywhere() -> None:
     line = Timeline().body(z=-0.05, over=0.8).hold(0.4).home(over=1.0)
     assert [(key.start, key.end) for key in line.keys] == [(0.0, 0.8), (0.8 + 0.4, 2.2)]
     assert line.end == pytest.approx(2.2)
-
-
-def test_at_puts_the_cursor_anywhere_and_also_at_the_start_of_the_last_move() -> None:
     line = Timeline().body(z=-0.05, over=1.0).at(0.25).body(pitch=0.1, over=0.5)
     assert line.keys[1].start == 0.25
     beside = Timeline().body(z=-0.05, over=1.0).also().body(pitch=0.1, over=0.3)
@@ -43,9 +40,16 @@ def test_at_puts_the_cursor_anywhere_and_also_at_the_start_of_the_last_move() ->
     assert beside.cursor == 1.0  # not before the longer of the two has ended
 
 
-def test_beats_are_seconds_of_sixty_per_minute() -> None:
+def test_beats_are_seconds_by_the_tempo_also_for_the_shift_before_a_raise() -> None:
     line = Timeline().bpm(120.0).body(z=-0.05, over=2.0).hold(1.0).at(4.0).home(over=1.0)
     assert [(key.start, key.end) for key in line.keys] == [(0.0, 1.0), (2.0, 2.5)]
+    line = Timeline(shift_time=0.5).foot("FR", z=0.05, over=0.5).home(over=0.5)
+    slow = line.bpm(120.0, shift_time=3.0).foot("FL", z=0.05, over=1.0)
+    first, _, second = slow.in_order(BalanceShift)
+    assert first.end - first.start == 0.5
+    assert second.end - second.start == pytest.approx(1.5)
+    again = slow.home(over=1.0).bpm(100.0).foot("FR", z=0.05, over=1.0).in_order(BalanceShift)[-1]
+    assert again.end - again.start == pytest.approx(0.6)  # a beat: the first that is 0.5 s or more
 
 
 @pytest.mark.parametrize(
@@ -58,16 +62,6 @@ def test_with_a_tempo_the_shift_before_a_raise_ends_on_a_beat(tempo: float, beat
     assert shift.end - shift.start == pytest.approx(beats * beat)
     assert beats * beat + EXACT >= SHIFT_TIME > (beats - 1.0) * beat
     assert up.start == pytest.approx((1.0 + beats) * beat)
-
-
-def test_the_shift_before_a_raise_may_be_given_in_beats() -> None:
-    line = Timeline(shift_time=0.5).foot("FR", z=0.05, over=0.5).home(over=0.5)
-    slow = line.bpm(120.0, shift_time=3.0).foot("FL", z=0.05, over=1.0)
-    first, _, second = slow.in_order(BalanceShift)
-    assert first.end - first.start == 0.5
-    assert second.end - second.start == pytest.approx(1.5)
-    again = slow.home(over=1.0).bpm(100.0).foot("FR", z=0.05, over=1.0).in_order(BalanceShift)[-1]
-    assert again.end - again.start == pytest.approx(0.6)  # a beat: the first that is 0.5 s or more
 
 
 # --- joining --------------------------------------------------------------------------------------
@@ -257,15 +251,12 @@ def test_closed_form_angles_bring_the_foot_to_its_place(leg: Leg, share: list[fl
     assert MODEL.forward_kinematics(whole)[1][leg] == pytest.approx(place[0], abs=EXACT)
 
 
-def test_a_standing_robot_has_the_angles_it_stands_with() -> None:
+def test_a_robot_stands_with_its_angles_and_is_there_when_a_key_ends() -> None:
     value, _, _ = curves_at(plan_of(Timeline().body(z=-0.01, over=1.0).home(over=1.0)), 0.0)
     q = np.concatenate([HOME[:3], [0.0, 0.0, 0.0, 1.0], value[6:18]])
     _, feet = MODEL.forward_kinematics(q)
     assert feet[:, 2] == pytest.approx(np.full(4, MODEL.foot_radius), abs=NEAR)
     assert feet[:, :2] == pytest.approx(MODEL.p_base_feet_nominal[:, :2], abs=NEAR)
-
-
-def test_a_key_of_the_body_is_reached_when_it_ends() -> None:
     line = Timeline().body(x=0.02, y=-0.01, z=-0.06, roll=0.1, pitch=-0.1, yaw=0.2, over=1.0)
     assert all(isinstance(key, BodyKey) for key in line.keys)
     value, rate, _ = curves_at(plan_of(line), 1.0)

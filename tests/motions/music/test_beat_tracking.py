@@ -112,7 +112,9 @@ def test_a_sound_without_a_beat_is_refused(samples: np.ndarray, words: str, tmp_
         beats(sound(samples, tmp_path))
 
 
-def test_a_file_that_is_no_song_is_refused(tmp_path: Path) -> None:
+def test_what_is_no_song_or_lasts_hours_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "words.wav"
     path.write_text("la la la", encoding="utf-8")
     with pytest.raises(CommandError, match=r"words.wav is no song that can be read; valid: WAV"):
@@ -120,11 +122,6 @@ def test_a_file_that_is_no_song_is_refused(tmp_path: Path) -> None:
     for missing in (tmp_path / "none.wav", tmp_path):
         with pytest.raises(CommandError, match="there is no such file"):
             beats(missing)
-
-
-def test_a_song_of_hours_is_refused_before_it_is_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
     monkeypatch.setattr("motions.music.songs.LONGEST", 5.0)
     with pytest.raises(CommandError, match="is 12 s long, 5 s at most"):
         beats(saved(click_track(90.0, SECONDS), tmp_path))

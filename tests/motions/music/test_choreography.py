@@ -63,20 +63,32 @@ def test_a_foot_comes_down_with_speed_and_the_trunk_turns_back_without_a_rest() 
     assert {key.ease for key in dance.timeline.in_order(BodyKey)} >= {Ease.CUBIC}
 
 
-def test_a_seed_is_a_dance_and_no_move_follows_itself() -> None:
+def test_a_seed_is_a_dance_without_the_same_move_twice_and_unknown_ones_are_refused() -> None:
     names = [[item.move.name for item in compose(steady(120.0), seed).moves] for seed in (1, 1, 2)]
     assert names[0] == names[1] != names[2]
     for seed in range(20):
         moves = compose(steady(97.0), seed).moves
         assert all(first.move is not second.move for first, second in pairwise(moves))
+    with pytest.raises(CommandError, match=r"unknown move 'moonwalk'; valid: bob, bow"):
+        compose(steady(100.0), 0, ["moonwalk"])
+    with pytest.raises(CommandError, match="too short for a dance"):
+        compose(steady(100.0, 2.2), 0)
 
 
-def test_one_dances_on_the_strong_beats_of_a_fast_song() -> None:
+def test_a_fast_song_is_danced_on_its_strong_beats_and_a_waltz_in_threes() -> None:
     """A song that was counted twice as fast as it is played is danced on its beats."""
     fast = steady(160.0, strengths=(0.2, 1.0))
     assert pulses_of(fast).times == pytest.approx(fast.times[1::2])
     slow = steady(90.0, strengths=(0.2, 1.0))
     assert pulses_of(slow).times == pytest.approx(slow.times)
+    waltz, other = (compose(steady(90.0, metre=metre), 0).moves for metre in (3, 4))
+    assert {item.move.name for item in waltz} >= set(WALTZ)
+    assert not {item.move.name for item in other} & set(WALTZ)
+    fast = steady(170.0, metre=3, downbeat=1)
+    assert pulses_of(fast).times == pytest.approx(fast.times[1::3])
+    twice = pulses_of(steady(140.0, metre=6, downbeat=1))  # counted twice as fast as it is played
+    assert twice.times == pytest.approx(steady(140.0).times[1::2])
+    assert (twice.bar, twice.downbeat) == (3, 0)
 
 
 @pytest.mark.parametrize("downbeat", range(3))
@@ -99,26 +111,12 @@ def test_moves_begin_with_the_bars(metre: int, bpm: float, downbeat: int) -> Non
         assert begun >= 0.6 * (len(firsts) / max(pulses.usual * bpm / 60.0 / metre, 1.0) - 2)
 
 
-def test_a_waltz_has_moves_of_three_and_a_fast_one_is_danced_in_ones() -> None:
-    waltz, other = (compose(steady(90.0, metre=metre), 0).moves for metre in (3, 4))
-    assert {item.move.name for item in waltz} >= set(WALTZ)
-    assert not {item.move.name for item in other} & set(WALTZ)
-    fast = steady(170.0, metre=3, downbeat=1)
-    assert pulses_of(fast).times == pytest.approx(fast.times[1::3])
-    twice = pulses_of(steady(140.0, metre=6, downbeat=1))  # counted twice as fast as it is played
-    assert twice.times == pytest.approx(steady(140.0).times[1::2])
-    assert (twice.bar, twice.downbeat) == (3, 0)
-
-
-def test_where_no_move_may_begin_is_a_rest() -> None:
+def test_where_no_move_may_begin_is_a_rest_and_what_comes_too_soon_left_out() -> None:
     """Two beats of sway leave the third one of a waltz."""
     dance = compose(steady(90.0, metre=3), 0, ["sway"])
     starts = np.array([item.pulse for item in dance.moves])
     assert np.unique(np.diff(starts)).tolist() == [3]
     assert CHECKER.evaluate(dance.timeline).report.ok
-
-
-def test_a_beat_that_comes_too_soon_is_left_out() -> None:
     times = np.sort(np.append(np.arange(1.0, 20.0, 0.75), 5.9))
     found = Beats(80.0, times, np.ones(len(times)), 20.0, 1.0)
     assert len(pulses_of(found).times) == len(times) - 1
@@ -146,13 +144,6 @@ def test_a_move_that_is_refused_is_replaced_by_another(monkeypatch: pytest.Monke
 
 def test_a_long_song_is_danced_for_three_minutes() -> None:
     assert 175.0 < compose(steady(90.0, 400.0), 0).timeline.end < 182.0
-
-
-def test_an_unknown_move_and_a_short_song_are_refused() -> None:
-    with pytest.raises(CommandError, match=r"unknown move 'moonwalk'; valid: bob, bow"):
-        compose(steady(100.0), 0, ["moonwalk"])
-    with pytest.raises(CommandError, match="too short for a dance"):
-        compose(steady(100.0, 2.2), 0)
 
 
 PERIOD = 0.002

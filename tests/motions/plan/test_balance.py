@@ -55,14 +55,11 @@ def sway(asked: Stepping) -> np.ndarray:
     return SwayProblem(asked).solve(asked)
 
 
-def test_a_problem_is_solved_with_another_bias_as_if_it_were_made_with_it() -> None:
+def test_nothing_moves_where_nothing_must_and_a_bias_counts_as_if_made_with_it() -> None:
     asked = stepping({Leg.FL: (1.0, 1.3), Leg.RR: (1.5, 1.9)})
     biased = replace(asked, bias=np.full((len(TIMES), 2), 0.01))
     assert np.array_equal(SwayProblem(asked).solve(biased), sway(biased))
     assert not np.array_equal(sway(asked), sway(biased))
-
-
-def test_nothing_moves_where_nothing_must() -> None:
     assert not sway(stepping({})).any()
 
 
@@ -90,15 +87,12 @@ def test_the_zero_moment_point_stays_on_the_line_of_two_feet() -> None:
     assert still.max() > 0.01
 
 
-def test_what_the_pendulum_leaves_out_is_made_up_for() -> None:
+def test_what_the_pendulum_leaves_out_is_made_up_for_or_the_least_bad_way_taken() -> None:
     asked = stepping({Leg.FL: (1.0, 1.5)})
     biased = replace(asked, bias=np.tile([0.0, 0.01], (len(TIMES), 1)))
     rows = ~asked.stance.all(axis=1)
     margins = support_margins(NOMINAL[1:, :2], biased.zmp(sway(biased))[rows])
     assert margins.min() > INSIDE - LEFT_OVER
-
-
-def test_where_no_way_keeps_the_margins_the_least_bad_one_comes_out() -> None:
     asked = stepping(dict.fromkeys([Leg.FL, Leg.RL], (1.0, 2.0)))  # on the right feet alone
     short = replace(asked, times=TIMES / 10.0)
     way = sway(short)

@@ -30,18 +30,15 @@ def jumps(model: RobotModel) -> CompiledPlan:
     return compile_timeline(line, model)
 
 
-def test_places_and_speeds_go_on_where_parts_meet(jumps: CompiledPlan) -> None:
+def test_parts_meet_in_places_and_speeds_and_a_plan_lasts_as_long_as_its_timeline(
+    jumps: CompiledPlan,
+) -> None:
     knots, c = jumps.curves.x, jumps.curves.c
     dt = np.diff(knots)[:-1, None]
     place = ((c[0, :-1] * dt + c[1, :-1]) * dt + c[2, :-1]) * dt + c[3, :-1]
     speed = (3.0 * c[0, :-1] * dt + 2.0 * c[1, :-1]) * dt + c[2, :-1]
     np.testing.assert_allclose(place, c[3, 1:], atol=_SAME)
     np.testing.assert_allclose(speed, c[2, 1:], atol=_SAME)
-
-
-def test_it_lasts_as_long_as_the_timeline_says_and_its_contacts_are_in_order(
-    jumps: CompiledPlan,
-) -> None:
     assert all(b > a for a, b in pairwise(jumps.contacts.times))
     first, second = jumps.dynamic
     assert first.start == pytest.approx(1.0)
@@ -50,13 +47,21 @@ def test_it_lasts_as_long_as_the_timeline_says_and_its_contacts_are_in_order(
     assert not jumps.at(first.start + 0.6).stance.any()
 
 
-def test_what_follows_a_jump_counts_from_where_it_lands(jumps: CompiledPlan) -> None:
+def test_after_a_jump_all_counts_from_where_it_lands_and_in_flight_feet_bear_all_along(
+    jumps: CompiledPlan,
+) -> None:
     x, y, yaw = jumps.end_pose
     assert (x, y) == pytest.approx((0.0, 0.5), abs=_LANDED)  # ahead, after a turn to the left
     assert yaw == pytest.approx(deg(90), abs=0.01)
     paw = jumps.at(jumps.duration - 1.7)
     assert paw.stance.tolist() == [True, False, True, True]
     assert paw.body.p_world[1] == pytest.approx(0.5, abs=0.1)
+    span = jumps.dynamic[0]
+    stance = span.trajectory.stance
+    take_off = span.start + span.trajectory.times[int(np.argmin(stance.all(axis=1)))]
+    loads = jumps.samples(np.array([take_off - 1e-4, take_off + 1e-4])).normal_force_max
+    assert loads[0].min() == pytest.approx(400.0)
+    assert loads[1].max() == 0.0
 
 
 def test_a_solved_part_is_played_with_the_forces_that_it_was_solved_with(
@@ -70,17 +75,6 @@ def test_a_solved_part_is_played_with_the_forces_that_it_was_solved_with(
         assert asked.force_weight == FORCE_WEIGHT
     assert jumps.at(span.start - 1e-3).force_weight == 0.0
     assert jumps.at(span.end + 1e-3).force_weight == 0.0
-
-
-def test_in_flight_a_foot_has_its_load_from_its_first_instant_to_its_last(
-    jumps: CompiledPlan,
-) -> None:
-    span = jumps.dynamic[0]
-    stance = span.trajectory.stance
-    take_off = span.start + span.trajectory.times[int(np.argmin(stance.all(axis=1)))]
-    loads = jumps.samples(np.array([take_off - 1e-4, take_off + 1e-4])).normal_force_max
-    assert loads[0].min() == pytest.approx(400.0)
-    assert loads[1].max() == 0.0
 
 
 def test_the_library_s_plans_are_shipped_and_none_is_left_over(model: RobotModel) -> None:
@@ -174,6 +168,7 @@ def spans(path: Trajectory, *broken: float) -> list[tuple[float, float]]:
         ((0.6, 1.6), [(0.5 - LEAD, 1.7 + LEAD)]),  # poses without a hold between them
         ((1.0, 3.0), [(0.2, 2.0), (2.4, 3.95)]),  # the ends bound the last
         ((), []),
+        ((0.5,), [(0.5 - LEAD, 1.7 + LEAD)]),  # as the rest ends
         ((2.2,), [(0.2, 3.95)]),  # a rest that breaks a limit itself is no end
     ],
 )
@@ -183,16 +178,12 @@ def test_every_part_that_is_broken_is_mended(
     assert spans(path, *broken) == mended
 
 
-def test_at_a_rest_that_was_checked_elsewhere_nothing_ends(path: Trajectory) -> None:
+def test_a_rest_ends_a_part_at_home_and_none_that_was_checked_elsewhere(path: Trajectory) -> None:
     model = RobotModel()
     aside = LINE.at(1.2).body(x=0.01, over=0.1).at(LINE.end)
     other = trajectory_of(compile_timeline(aside, model), model)
     (piece,) = pieces_to_repair(path, other, np.array([1.0]))
     assert piece.end == pytest.approx(path.times[-1])
-
-
-def test_at_home_an_instant_of_rest_is_enough_unless_the_trunk_only_passes_it() -> None:
-    model = RobotModel()
     line = Timeline().body(y=0.03, over=0.5).home(over=0.5).body(y=0.03, over=0.4)
     line = line.body(y=-0.03, over=0.4).home(over=0.4)
     path = trajectory_of(compile_timeline(line, model), model)

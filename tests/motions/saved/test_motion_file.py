@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from go2_wbc.curves import Ease
 from go2_wbc.errors import ConfigError, MotionFileError, TimelineError
 from motions import Timeline, check, find_motion, load_motion, motion_names, save_motion
 from motions.language.keys import Key
+from motions.saved import values
 from motions.saved.files import KINDS
 from tests.motions.saved.random_timelines import Written, timeline_of, written
 
@@ -65,25 +67,30 @@ def test_any_timeline_comes_back_as_it_was(tmp_path: Path, drawn: Written) -> No
     assert type(again) is Timeline
 
 
-def test_the_file_has_a_line_for_each_key_and_says_what_it_is(file: Path) -> None:
+def test_a_file_has_a_line_for_each_key_and_what_it_leaves_out_its_default(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     lines = file.read_text().splitlines()
     assert sum('"key": ' in line for line in lines) == len(TIMELINE.keys)
     fields = json.loads(file.read_text())
     assert (fields["format"], fields["version"]) == ("go2_wbc.motion", 1)
     assert fields["go2_wbc"] == go2_wbc.__version__
+    names = ("name", "balance", "cursor", "clock", "floor", "last_start")
+    changed(file, lambda fields: [fields.pop(name) for name in names])
+    assert load_motion(file).keys == TIMELINE.keys
+    assert load_motion(file).name == "motion"
+    with pytest.raises(TimelineError, match="has no parameters, got times"):
+        load_motion(file, times=3)
+    for least, expected in ((0, nullcontext()), (1, pytest.raises(MotionFileError, match="larg"))):
+        monkeypatch.setattr(values, "LARGEST_FILE", file.stat().st_size - least)
+        with expected:
+            load_motion(file)
 
 
 def test_a_saved_motion_is_played_and_checked_by_the_name_of_its_file(tmp_path: Path) -> None:
     path = save_motion(load_motion("bow"), tmp_path / "mine.json")
     assert check(str(path)).ok
     assert check(path).margins == check("bow").margins
-
-
-def test_what_a_file_leaves_out_keeps_its_default(file: Path) -> None:
-    names = ("name", "balance", "cursor", "clock", "floor", "last_start")
-    changed(file, lambda fields: [fields.pop(name) for name in names])
-    assert load_motion(file).keys == TIMELINE.keys
-    assert load_motion(file).name == "motion"
 
 
 def set_key(name: str, value: object) -> Change:
@@ -154,7 +161,9 @@ def test_what_is_no_motion_is_refused(file: Path, text: str) -> None:
         load_motion(file)
 
 
-def test_a_missing_file_and_a_folder_are_named(tmp_path: Path) -> None:
+def test_a_missing_file_a_folder_and_a_place_that_cannot_be_written_are_named(
+    tmp_path: Path,
+) -> None:
     with pytest.raises(MotionFileError, match=r"there is no file .*none\.json"):
         load_motion(tmp_path / "none.json")
     (tmp_path / "folder.json").mkdir()
@@ -162,6 +171,9 @@ def test_a_missing_file_and_a_folder_are_named(tmp_path: Path) -> None:
         load_motion(tmp_path / "folder.json")
     with pytest.raises(ConfigError, match="a folder has this name"):
         save_motion(TIMELINE, tmp_path / "folder.json")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ConfigError, match="cannot write"):
+        save_motion(TIMELINE, tmp_path / "file" / "small.json")
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,17 +198,6 @@ def test_what_a_file_cannot_hold_is_refused_and_the_old_file_kept(file: Path) ->
         save_motion(TIMELINE, file.with_suffix(".txt"))
     assert file.read_bytes() == before
     assert [path.name for path in file.parent.iterdir()] == [file.name]
-
-
-def test_a_place_that_cannot_be_written_is_said(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(ConfigError, match="cannot write"):
-        save_motion(TIMELINE, tmp_path / "file" / "small.json")
-
-
-def test_a_saved_motion_has_no_parameters(file: Path) -> None:
-    with pytest.raises(TimelineError, match="has no parameters, got times"):
-        load_motion(file, times=3)
 
 
 def test_the_commands_write_and_take_saved_motions(

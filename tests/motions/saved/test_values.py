@@ -35,14 +35,11 @@ WHOLE = Whole(
 )
 
 
-def test_a_nested_value_comes_back_as_it_was() -> None:
+def test_nested_values_and_numbers_of_numpy_come_back() -> None:
     text = json.dumps(Encoder().encoded(WHOLE, "it"))
     assert Decoder().decoded(json.loads(text), Whole, "it") == WHOLE
     assert '"legs": ["FL", "FR"]' in text
     assert '"ease": "in"' in text
-
-
-def test_numbers_of_numpy_are_numbers() -> None:
     assert Encoder().encoded((np.float64(0.5), np.int64(3)), "it") == [0.5, 3]
 
 

@@ -34,16 +34,12 @@ def _points_of(link: str) -> np.ndarray:
     return local @ T[:3, :3].T + T[:3, 3]
 
 
-def test_each_mesh_is_loaded_once_and_shared_by_the_legs() -> None:
+def test_each_mesh_is_loaded_once_and_lies_as_in_pinocchios_own_loader() -> None:
     visuals = load_robot_visuals()
     shown = [item.meshPath for item in visuals.geometry.geometryObjects]
     assert len(shown) == 17
     assert len(visuals.meshes) == 7
     assert sum(path.endswith("hip.dae") for path in shown) == 4
-
-
-def test_every_mesh_lies_as_in_pinocchios_own_loader() -> None:
-    visuals = load_robot_visuals()
     description = find_description()
     geometry = pin.GeometryModel()
     folders = [str(folder) for folder in description.package_dirs]
@@ -58,14 +54,11 @@ def test_every_mesh_lies_as_in_pinocchios_own_loader() -> None:
         np.testing.assert_allclose(points.max(axis=0), box.max_.ravel(), atol=2e-5)
 
 
-def test_the_sole_of_each_foot_is_where_the_contact_model_puts_it() -> None:
+def test_soles_are_where_contacts_put_them_and_normals_point_out() -> None:
     feet = PosedRobot(load_robot_visuals()).feet(_STAND)
     for leg in LEGS:
         sole = _points_of(leg.foot)[:, 2].min()
         assert sole == pytest.approx(feet[leg, 2] - FOOT_RADIUS, abs=_MESH_ERROR)
-
-
-def test_normals_are_unit_and_point_out_of_the_faces() -> None:
     for parts in load_robot_visuals().meshes.values():
         for surface in parts:
             np.testing.assert_allclose(np.linalg.norm(surface.normals, axis=1), 1.0)

@@ -54,15 +54,12 @@ def test_times_outside_the_recording_and_none_are_refused(
         viz.export_filmstrip(recording, tmp_path / "strip.png", times=times)
 
 
-def test_the_camera_follows_the_robot_calmly(recording: Recording) -> None:
+def test_the_camera_follows_calmly_and_its_heading_over_full_turns(recording: Recording) -> None:
     times, points = camera_path(recording, PosedRobot(load_robot_visuals()), smoothing=0.5)
     base = recording.q[nearest_rows(recording, times), :2]
     assert np.linalg.norm(points[:, :2] - base, axis=1).max() < 0.35
     speed = np.linalg.norm(np.diff(points, axis=0), axis=1) / np.diff(times)
     assert speed.max() < 0.8
-
-
-def test_the_heading_stays_continuous_over_full_turns(recording: Recording) -> None:
     yaw = np.linspace(0.0, 3 * np.pi, len(recording.time))
     q = recording.q.copy()
     q[:, 3:7] = 0.0

@@ -37,8 +37,19 @@ def page(recording: Recording, tmp_path_factory: pytest.TempPathFactory) -> str:
     return path.read_text(encoding="utf-8")
 
 
-def test_the_page_is_small(page: str) -> None:
+def test_the_page_is_small_loads_nothing_and_has_its_title_and_viewer(page: str) -> None:
     assert len(page.encode()) < PAGE_LIMIT / 2
+    code = re.sub(r'<script type="text/plain".*?</script>', "", page, flags=re.DOTALL)
+    asks = r"https?://|wss?://|\ssrc\s*=|@import|url\(|fetch\(|XMLHttp|EventSource"
+    assert re.findall(asks, code) == []
+    assert re.findall(r'href="([^"]*)"', code) == ["data:,"]
+    assert "connect()" not in code
+    shown = "Demo &lt;b&gt; &amp; &quot;co&quot; @DATA@ &lt;/script&gt;"
+    assert page.count(shown) == 2
+    assert "<b>" not in page.replace('<b id="now">', "")
+    bundle = packed_parts(page)["meshcat-bundle"]
+    assert b"MeshCat" in bundle
+    assert len(bundle) > 500_000
 
 
 def test_the_ground_that_was_seen_is_in_the_page(recording: Recording, tmp_path: Path) -> None:
@@ -52,14 +63,6 @@ def test_the_ground_that_was_seen_is_in_the_page(recording: Recording, tmp_path:
     assert arrays["target"][:, 2] == pytest.approx(0.0, abs=0.1)
 
 
-def test_nothing_in_the_page_is_loaded_from_elsewhere(page: str) -> None:
-    code = re.sub(r'<script type="text/plain".*?</script>', "", page, flags=re.DOTALL)
-    asks = r"https?://|wss?://|\ssrc\s*=|@import|url\(|fetch\(|XMLHttp|EventSource"
-    assert re.findall(asks, code) == []
-    assert re.findall(r'href="([^"]*)"', code) == ["data:,"]
-    assert "connect()" not in code
-
-
 def test_the_page_has_every_element_and_style_that_its_scripts_name(page: str) -> None:
     assets = resources.files("viz.replay") / "assets"
     names = [file.name for file in assets.iterdir() if file.name.endswith(".js")]
@@ -70,19 +73,9 @@ def test_the_page_has_every_element_and_style_that_its_scripts_name(page: str) -
     assert set(re.findall(r"className = \"(\w+)", scripts)) <= set(re.findall(r"\.(\w+)", page))
 
 
-def test_the_title_is_shown_as_text(page: str) -> None:
-    shown = "Demo &lt;b&gt; &amp; &quot;co&quot; @DATA@ &lt;/script&gt;"
-    assert page.count(shown) == 2
-    assert "<b>" not in page.replace('<b id="now">', "")
-
-
-def test_meshcats_own_viewer_is_inside(page: str) -> None:
-    bundle = packed_parts(page)["meshcat-bundle"]
-    assert b"MeshCat" in bundle
-    assert len(bundle) > 500_000
-
-
-def test_each_mesh_is_stored_once_and_every_link_refers_to_it(page: str) -> None:
+def test_the_motion_in_the_page_is_the_recorded_one_and_each_mesh_is_stored_once(
+    page: str, recording: Recording
+) -> None:
     header, arrays = read_data(page)
     visuals = load_robot_visuals()
     parts = sum(len(parts) for parts in visuals.meshes.values())
@@ -98,6 +91,12 @@ def test_each_mesh_is_stored_once_and_every_link_refers_to_it(page: str) -> None
     assert set(references) == set(range(parts))
     assert max(references.values()) == 4
     assert not any("data" in geometry for item in objects for geometry in item["geometries"])
+    rate, frames = replay_frames(recording)
+    assert (header["rate"], header["frames"]) == (rate, len(frames["q"]))
+    for name, values in frames.items():
+        step = max(np.nanmax(1.0 * values) - np.nanmin(1.0 * values), 1e-5) / 65535
+        np.testing.assert_allclose(arrays[name], values, rtol=1e-6, atol=step)
+    assert [label for _, _, label in header["labels"]] == ["stand", "walk", "high_five", "sit"]
 
 
 def test_stored_meshes_are_those_of_the_robot(page: str) -> None:
@@ -132,23 +131,12 @@ def test_the_scene_tree_moves_every_link_as_pinocchio_does(page: str, seed: int)
         )
 
 
-def test_the_motion_in_the_page_is_the_recorded_one(page: str, recording: Recording) -> None:
-    header, arrays = read_data(page)
-    rate, frames = replay_frames(recording)
-    assert (header["rate"], header["frames"]) == (rate, len(frames["q"]))
-    for name, values in frames.items():
-        step = max(np.nanmax(1.0 * values) - np.nanmin(1.0 * values), 1e-5) / 65535
-        np.testing.assert_allclose(arrays[name], values, rtol=1e-6, atol=step)
-    assert [label for _, _, label in header["labels"]] == ["stand", "walk", "high_five", "sit"]
-
-
-def test_the_same_recording_gives_the_same_page(recording: Recording, tmp_path: Path) -> None:
+def test_the_same_recording_gives_the_same_page_and_an_hour_still_fits(
+    recording: Recording, tmp_path: Path
+) -> None:
     first = viz.export_html(recording, tmp_path / "a.html", title="t").read_bytes()
     second = viz.export_html(recording, tmp_path / "b.html", title="t").read_bytes()
     assert first == second
-
-
-def test_an_hour_still_fits_into_the_page(recording: Recording, tmp_path: Path) -> None:
     noise = np.random.default_rng(0).normal(0, 0.01, recording.q.shape)
     stretched = replace(recording, time=recording.time * 1000, q=recording.q + noise)
     path = viz.export_html(stretched, tmp_path / "long.html", title="long")
@@ -180,13 +168,12 @@ def plan_page(content: ReplayContent, tmp_path_factory: pytest.TempPathFactory) 
     return viz.export_html(content, path, title="A plan").read_text(encoding="utf-8")
 
 
-def test_the_header_is_strict_json(plan_page: str) -> None:
-    content = packed_parts(plan_page)["replay-data"]
-    length = int.from_bytes(content[:4], "little")
-    json.loads(content[4 : 4 + length], parse_constant=pytest.fail)
-
-
-def test_the_curves_are_the_given_ones(plan_page: str, content: ReplayContent) -> None:
+def test_the_plan_in_the_page_has_its_curves_annotations_and_ghost(
+    plan_page: str, content: ReplayContent
+) -> None:
+    data = packed_parts(plan_page)["replay-data"]
+    length = int.from_bytes(data[:4], "little")
+    json.loads(data[4 : 4 + length], parse_constant=pytest.fail)
     header, arrays = read_data(plan_page)
     assert content.verdict is not None
     for k, curve in enumerate(content.verdict.ranked()):
@@ -194,19 +181,11 @@ def test_the_curves_are_the_given_ones(plan_page: str, content: ReplayContent) -
         np.testing.assert_allclose(arrays[f"curve{k}.time"], curve.time, rtol=1e-6)
         subjects = header["verdict"]["curves"][k]["subjects"]
         assert subjects[arrays[f"curve{k}.worst"][0]] == curve.subjects[curve.worst[0]]
-
-
-def test_the_annotations_are_all_there_with_their_times_and_parts(plan_page: str) -> None:
-    header, _ = read_data(plan_page)
     annotations = header["verdict"]["annotations"]
     limits = [annotation["limit"] for annotation in annotations]
     assert limits == ["support", "joint position", "friction"]
     assert annotations[1]["parts"] == ["FR_calf"]
     assert annotations[1]["spans"][0][0] < annotations[1]["time"] < annotations[1]["spans"][0][1]
-
-
-def test_the_ghost_is_stored_beside_the_robot(plan_page: str, content: ReplayContent) -> None:
-    header, arrays = read_data(plan_page)
     assert header["ghost"]["frames"] == len(arrays["ghost.q"])
     np.testing.assert_allclose(arrays["ghost.q"], arrays["q"] + 0.001, atol=_ROUNDING)
     np.testing.assert_allclose(arrays["ghost.forces"], arrays["forces"] * 0.5, atol=2 * _ROUNDING)

@@ -180,12 +180,11 @@ def test_the_server_works_in_daemon_threads_only(recording: Recording) -> None:
         assert all(thread.daemon for thread in started)
 
 
-def test_a_port_in_use_is_named(server: PreviewServer, recording: Recording) -> None:
+def test_a_port_in_use_or_out_of_range_is_refused(
+    server: PreviewServer, recording: Recording
+) -> None:
     port = _port(server)
     with pytest.raises(ConfigError, match=f"cannot listen on port {port} of 127.0.0.1"):
         PreviewServer(ReplayContent(recording), "t", port)
-
-
-def test_a_port_out_of_range_is_refused(recording: Recording) -> None:
     with pytest.raises(ConfigError, match="port 70000 is not valid"):
         PreviewServer(ReplayContent(recording), "t", 70_000)

@@ -79,12 +79,9 @@ def gate(clock: Clock) -> CommandGate:
     return CommandGate(model.q_lower, model.q_upper, clock)
 
 
-def test_without_commands_the_controller_has_the_robot(gate: CommandGate) -> None:
+def test_a_good_command_reaches_its_motor_and_none_one_that_is_off(gate: CommandGate) -> None:
     assert tick(gate, [], OWN) is OWN
     assert not gate.is_active
-
-
-def test_a_good_command_reaches_the_right_motor(gate: CommandGate) -> None:
     command = tick(gate, [sample()], OWN)
     thigh = 3 * Leg.FR + 1
     assert command.kp[thigh] == 30.0
@@ -92,9 +89,6 @@ def test_a_good_command_reaches_the_right_motor(gate: CommandGate) -> None:
     assert command.tau[thigh] == 4.0
     assert np.count_nonzero(command.kp) == np.count_nonzero(command.tau) == 1
     assert (command.kd == 2.0).all()
-
-
-def test_a_motor_that_is_switched_off_gets_nothing(gate: CommandGate) -> None:
     command = tick(gate, [sample(setting("mode", 1, 0))], OWN)
     thigh = 3 * Leg.FR + 1
     assert command.kp[thigh] == command.kd[thigh] == command.tau[thigh] == 0.0
@@ -228,36 +222,24 @@ def test_torque_is_limited_and_never_pushes_past_a_joints_limit(guards: Guards) 
     assert guards.soften(JointCommand.torque(np.full(12, -9.0)), at(RAMP, joints)).tau[2] == -9.0
 
 
-def test_a_tilted_robot_is_a_fault(guards: Guards) -> None:
+def test_a_robot_that_tilts_bends_too_far_or_is_not_finite_is_a_fault(guards: Guards) -> None:
     assert guards.fault(at(0.0, roll=1.1)) is None
     assert guards.fault(at(0.0, roll=1.3)) == "tilted: roll 74 deg, pitch 0 deg"
-
-
-def test_a_joint_far_beyond_its_limit_is_a_fault(guards: Guards) -> None:
     joints = TUCKED_JOINTS.copy()
     joints[5] = -0.5
     reason = guards.fault(at(0.0, joints))
     assert reason is not None
     assert reason.startswith("joint 5 is 0.3")
-
-
-def test_a_state_that_is_not_finite_is_a_fault(guards: Guards) -> None:
     joints = TUCKED_JOINTS.copy()
     joints[0] = np.nan
     assert guards.fault(at(0.0, joints)) == "the measured state is not finite"
 
 
-def test_only_damping_is_passive() -> None:
+def test_only_damping_is_passive_and_what_is_not_finite_or_no_limit_is_refused() -> None:
     assert is_passive(JointCommand.damping(3.0))
     assert not is_passive(TAU)
     assert not is_passive(JointCommand.servo(TUCKED_JOINTS, np.zeros(12), 1.0, 1.0))
-
-
-def test_a_command_that_is_not_finite_is_named() -> None:
     with pytest.raises(CommandError, match="kp must be 12 finite numbers"):
         require_sane(replace(TAU, kp=np.full(12, np.nan)))
-
-
-def test_limits_must_be_positive() -> None:
     with pytest.raises(ConfigError, match="stale_limit"):
         GuardConfig(stale_limit=0.0)

@@ -28,21 +28,17 @@ INTEGRATOR_TOLERANCE = 5e-3
 # --- forces -------------------------------------------------------------------------------------
 
 
-def test_the_forces_on_a_lying_robot_sum_to_its_weight(plant: MujocoPlant) -> None:
+def test_the_forces_on_a_lying_robot_sum_to_its_weight_below_its_feet_and_in_the_air_are_none(
+    plant: MujocoPlant,
+) -> None:
     for _ in range(500):
         plant.write(DAMPED)
     parts = plant.read().foot_forces.sum() + plant.base_contact_force + plant.limb_contact_force
     assert parts == pytest.approx(plant.total_mass * GRAVITY, rel=STATIC_TOLERANCE)
-
-
-def test_the_contact_of_each_foot_is_below_its_own_centre(plant: MujocoPlant) -> None:
     stand_up(plant)
     contacts = plant.foot_contacts()
     below = contacts.p_world_contact - plant.p_world_feet
     assert below == pytest.approx(np.tile([0.0, 0.0, -FOOT_RADIUS], (4, 1)), abs=SINKING)
-
-
-def test_in_the_air_nothing_touches(plant: MujocoPlant) -> None:
     fly(plant)
     plant.write(DAMPED)
     assert not plant.read().foot_forces.any()

@@ -25,16 +25,13 @@ def scans(plant: MujocoPlant, ticks: int) -> list[tuple[float, Scan]]:
     return told
 
 
-def test_scans_come_at_their_rate_and_as_late_as_they_are() -> None:
+def test_scans_come_at_their_rate_and_change_nothing_else() -> None:
     config = LidarConfig(rate=25.0, latency=0.03)
     told = scans(MujocoPlant(lidar=config), 200)
     np.testing.assert_allclose([scan.time for _, scan in told], 0.04 * np.arange(10), atol=1e-9)
     np.testing.assert_allclose([t - scan.time for t, scan in told], config.latency, atol=1e-9)
     assert all(scan.deviation == config.noise for _, scan in told)
     assert not scans(MujocoPlant(), 50)
-
-
-def test_a_lidar_changes_nothing_else() -> None:
     blind, seeing = (
         MujocoPlant(sensors="imu", seed=3),
         MujocoPlant(sensors="imu", seed=3, lidar=True),

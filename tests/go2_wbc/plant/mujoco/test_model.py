@@ -92,25 +92,12 @@ def _scale(array: np.ndarray, index: int, factor: float) -> None:
     array[index] = 1e-6 if np.isinf(factor) else factor * array[index]
 
 
-def test_the_built_robot_has_the_urdfs_mass_and_torque_limits() -> None:
+def test_the_built_robot_has_the_urdfs_masses_torques_and_feet() -> None:
     plant = MujocoPlant()
     assert plant.total_mass == pytest.approx(TOTAL_MASS, abs=1e-9)
     assert np.array_equal(plant.torque_limits, np.tile([23.7, 23.7, 45.43], 4))
     assert plant.model.nu == 12
     assert not plant.model.actuator_biastype.any()  # torque motors, no servo anywhere
-
-
-def test_joint_dynamics_reach_the_right_joints() -> None:
-    dynamics = JointDynamics((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0.8, 0.9))
-    model = MujocoPlant(joint_dynamics=dynamics).model
-    for index, name in enumerate(JOINT_NAMES):
-        part, dof = index % 3, model.joint(name).dofadr[0]
-        found = (model.dof_armature[dof], model.dof_damping[dof], model.dof_frictionloss[dof])
-        expected = (dynamics.armature[part], dynamics.damping[part], dynamics.friction_loss[part])
-        assert found == pytest.approx(expected)
-
-
-def test_the_feet_are_spheres_at_the_foot_frames() -> None:
     model = MujocoPlant().model
     for name in FOOT_NAMES:
         geom = model.geom(name)
@@ -119,7 +106,14 @@ def test_the_feet_are_spheres_at_the_foot_frames() -> None:
         assert not geom.pos.any()
 
 
-def test_solver_options_are_the_chosen_ones() -> None:
+def test_what_is_asked_of_joints_and_solver_reaches_them() -> None:
+    dynamics = JointDynamics((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0.8, 0.9))
+    model = MujocoPlant(joint_dynamics=dynamics).model
+    for index, name in enumerate(JOINT_NAMES):
+        part, dof = index % 3, model.joint(name).dofadr[0]
+        found = (model.dof_armature[dof], model.dof_damping[dof], model.dof_frictionloss[dof])
+        expected = (dynamics.armature[part], dynamics.damping[part], dynamics.friction_loss[part])
+        assert found == pytest.approx(expected)
     option = MujocoPlant(timestep=0.001, control_period=0.002).model.opt
     assert option.timestep == 0.001
     assert option.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -135,16 +129,13 @@ def touching_pairs(plant: MujocoPlant, angles: np.ndarray) -> set[frozenset[str]
     return {frozenset(pair) for pair in bodies}
 
 
-def test_links_that_the_srdf_excludes_do_not_collide_and_others_do() -> None:
+def test_links_that_the_srdf_excludes_do_not_collide_and_without_it_they_do(tmp_path: Path) -> None:
     plant = MujocoPlant()
     assert touching_pairs(plant, STAND) == set()
     crossed = STAND.copy()
     crossed[[0, 3]] = -0.6, 0.6  # both front feet towards the middle
     pairs = touching_pairs(plant, crossed)
     assert any({name[:2] for name in pair} == {"FL", "FR"} for pair in pairs)
-
-
-def test_without_the_srdf_the_base_touches_the_front_thighs(tmp_path: Path) -> None:
     # Found in the prototype: the standing foot forces then sum to half the weight.
     urdf = tmp_path / "go2.urdf"
     urdf.write_text(find_description().urdf_path.read_text(encoding="utf-8"), encoding="utf-8")
@@ -153,7 +144,7 @@ def test_without_the_srdf_the_base_touches_the_front_thighs(tmp_path: Path) -> N
     assert frozenset({"base", "FL_thigh"}) in pairs
 
 
-def test_the_payload_is_a_solid_box_at_the_bases_origin() -> None:
+def test_mass_scale_scales_the_robot_and_not_its_payload_a_solid_box() -> None:
     plain, loaded = MujocoPlant().model, MujocoPlant(payload=6.0).model
     payload = loaded.body(PAYLOAD_BODY)
     assert payload.mass[0] == 6.0
@@ -162,9 +153,6 @@ def test_the_payload_is_a_solid_box_at_the_bases_origin() -> None:
                                              2.0 * (0.1**2 + 0.06**2)])  # fmt: skip
     assert np.array_equal(loaded.body("base").mass, plain.body("base").mass)
     assert loaded.body_subtreemass[1] == pytest.approx(TOTAL_MASS + 6.0)
-
-
-def test_mass_scale_scales_masses_and_inertias_but_not_the_payload() -> None:
     plain, scaled = MujocoPlant().model, MujocoPlant(mass_scale=1.5, payload=2.0).model
     for name in ("base", "FL_thigh", "RR_foot"):
         assert scaled.body(name).mass == pytest.approx(1.5 * plain.body(name).mass)

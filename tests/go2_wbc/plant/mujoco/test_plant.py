@@ -39,16 +39,13 @@ class TestNoisyMujocoPlantContract(PlantContract):
 # --- starting ---------------------------------------------------------------------------------
 
 
-def test_the_robot_starts_at_time_zero_lying_still_on_its_belly(plant: MujocoPlant) -> None:
+def test_the_robot_starts_lying_still_on_its_belly_and_stays(plant: MujocoPlant) -> None:
     state = plant.read()
     assert state.time == plant.data.time == 0.0
     assert state.tilt < np.deg2rad(10)
     assert state.p_world_base[2] < 0.1
     assert np.abs(state.v).max() < 0.01
     assert plant.base_contact_force > 50.0
-
-
-def test_the_robot_lies_where_it_started_for_ten_seconds(plant: MujocoPlant) -> None:
     before = plant.read()
     for _ in range(5000):
         plant.write(DAMPED)
@@ -114,16 +111,16 @@ def test_a_driving_torque_is_cut_to_what_the_motor_gives_at_that_speed(share: fl
     assert np.array_equal(plant.read().tau, upper if share > 0 else lower)
 
 
-def test_a_braking_torque_is_cut_at_the_peak_only() -> None:
+def test_a_torque_meets_the_motors_line_when_it_drives_and_its_peak_when_it_brakes() -> None:
     plant, _ = spinning(0.9)
     plant.write(JointCommand.torque(np.full(12, -1000.0)))
     assert np.array_equal(plant.read().tau, -plant.torque_limits)
-
-
-def test_an_ideal_motor_gives_its_peak_at_any_speed() -> None:
     plant, _ = spinning(0.9, motor="ideal")
     plant.write(JointCommand.torque(np.full(12, 1000.0)))
     assert np.array_equal(plant.read().tau, plant.torque_limits)
+    plant, speeds = spinning(0.8)
+    plant.write(JointCommand.servo(STAND + 10.0, np.zeros(12), 60.0, 0.0))
+    assert np.array_equal(plant.read().tau, RobotModel().motor.limits(speeds)[1])
 
 
 @pytest.mark.parametrize(("motor", "is_passed"), [("torque-speed", False), ("ideal", True)])
@@ -143,12 +140,6 @@ def test_no_motor_drives_its_joint_beyond_its_speed_without_load(
     assert (fastest > 30.1) == is_passed
 
 
-def test_a_servo_meets_the_line_too() -> None:
-    plant, speeds = spinning(0.8)
-    plant.write(JointCommand.servo(STAND + 10.0, np.zeros(12), 60.0, 0.0))
-    assert np.array_equal(plant.read().tau, RobotModel().motor.limits(speeds)[1])
-
-
 def test_the_motor_law_is_evaluated_at_every_physics_step() -> None:
     coarse, fine = MujocoPlant(control_period=0.01), MujocoPlant(control_period=0.002)
     saved = coarse.save()
@@ -165,16 +156,13 @@ def test_the_motor_law_is_evaluated_at_every_physics_step() -> None:
     assert np.ptp(torques[:5], axis=0).max() > 0.1  # it really changed within one period
 
 
-def test_the_motor_law_has_the_documented_terms(plant: MujocoPlant) -> None:
+def test_the_motor_law_has_the_documented_terms_on_each_joint(plant: MujocoPlant) -> None:
     state = fly(plant, speed=0.1)
     rng = np.random.default_rng(3)
     tau, q_des, v_des, kp, kd = rng.uniform(0.0, 1.0, (5, 12))
     plant.write(JointCommand(tau, q_des, v_des, kp, kd))
     expected = tau + kp * (q_des - state.joint_positions) + kd * (v_des - state.joint_velocities)
     assert np.allclose(plant.read().tau, expected, atol=EXACT)
-
-
-def test_each_torque_acts_on_its_own_joint(plant: MujocoPlant) -> None:
     saved = plant.save()
     for joint in range(12):
         plant.restore(saved)
@@ -203,7 +191,7 @@ def test_velocities_are_the_derivatives_of_positions_in_pinocchios_conventions(
     assert np.allclose(after.joint_velocities, joints, atol=EXACT)
 
 
-def test_a_placed_state_is_read_back(plant: MujocoPlant) -> None:
+def test_a_placed_state_is_read_back_and_one_that_is_not_finite_refused(plant: MujocoPlant) -> None:
     rng = np.random.default_rng(5)
     q = np.concatenate([[1.0, -2.0, 3.0], rng.standard_normal(4), STAND + 0.1])
     q[3:7] /= np.linalg.norm(q[3:7])
@@ -211,9 +199,6 @@ def test_a_placed_state_is_read_back(plant: MujocoPlant) -> None:
     plant.place(q, v)
     assert np.allclose(plant.read().q, q, atol=EXACT)
     assert np.allclose(plant.read().v, v, atol=EXACT)
-
-
-def test_placing_at_what_is_not_finite_is_refused(plant: MujocoPlant) -> None:
     with pytest.raises(CommandError):
         plant.place(np.full(19, np.nan))
 
@@ -226,14 +211,11 @@ def test_the_feet_are_where_pinocchio_puts_them(plant: MujocoPlant, robot: pin.M
     assert np.allclose(plant.p_world_feet, expected, atol=EXACT)
 
 
-def test_the_imu_of_a_standing_robot_feels_gravity_upwards(plant: MujocoPlant) -> None:
+def test_the_imu_feels_gravity_standing_and_nothing_falling(plant: MujocoPlant) -> None:
     state, sample = stand_up(plant, 4.0), plant.imu()
     assert np.allclose(state.R_world_base @ sample.accelerometer, [0, 0, GRAVITY], atol=0.02)
     assert np.allclose(sample.gyro, state.v[3:6], atol=EXACT)
     assert np.allclose(sample.quaternion, state.q[3:7], atol=EXACT)
-
-
-def test_the_imu_of_a_falling_robot_feels_nothing(plant: MujocoPlant) -> None:
     fly(plant, speed=0.0)
     plant.write(JointCommand.torque(np.zeros(12)))
     assert np.abs(plant.imu().accelerometer).max() < 1e-6

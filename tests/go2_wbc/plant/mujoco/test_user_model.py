@@ -68,7 +68,9 @@ def test_an_export_that_has_our_sensors_is_accepted(tmp_path: Path) -> None:
     assert MujocoPlant(path).read().tilt < 0.2
 
 
-def test_motors_and_floor_are_added_where_they_are_missing(users_mjcf: Callable[..., Path]) -> None:
+def test_motors_and_floor_are_added_and_the_tighter_motor_limit_wins(
+    users_mjcf: Callable[..., Path],
+) -> None:
     def edit(spec: mujoco.MjSpec) -> None:
         delete_actuators(spec)
         spec.delete(spec.geom(FLOOR))
@@ -77,6 +79,14 @@ def test_motors_and_floor_are_added_where_they_are_missing(users_mjcf: Callable[
     assert plant.model.nu == 12
     assert np.array_equal(plant.torque_limits, np.tile([23.7, 23.7, 45.43], 4))
     assert stand_up(plant).q[2] == pytest.approx(stand_up(MujocoPlant()).q[2], abs=EXPORT_TOLERANCE)
+
+    def tighten(spec: mujoco.MjSpec) -> None:
+        spec.actuator("FR_calf").ctrlrange = [-20.0, 20.0]
+        spec.actuator("FR_hip").ctrlrange = [-99.0, 99.0]
+
+    limits = MujocoPlant(users_mjcf(tighten)).torque_limits
+    assert limits[5] == 20.0
+    assert limits[3] == 23.7
 
 
 def test_motors_in_another_order_still_drive_their_own_joints(
@@ -95,16 +105,6 @@ def test_motors_in_another_order_still_drive_their_own_joints(
         plant.place(np.concatenate([[0, 0, 3.0, 0, 0, 0, 1.0], STAND]))
         plant.write(JointCommand.torque(5.0 * np.eye(12)[joint]))
         assert np.argmax(np.abs(plant.read().joint_velocities)) == joint
-
-
-def test_a_tighter_motor_limit_of_the_users_model_wins(users_mjcf: Callable[..., Path]) -> None:
-    def edit(spec: mujoco.MjSpec) -> None:
-        spec.actuator("FR_calf").ctrlrange = [-20.0, 20.0]
-        spec.actuator("FR_hip").ctrlrange = [-99.0, 99.0]
-
-    limits = MujocoPlant(users_mjcf(edit)).torque_limits
-    assert limits[5] == 20.0
-    assert limits[3] == 23.7
 
 
 def test_what_stands_before_the_robot_in_the_file_can_be_pushed_too(
@@ -303,9 +303,13 @@ def test_all_faults_are_named_at_once(users_mjcf: Callable[..., Path]) -> None:
     assert [message for _, message in chosen if message not in str(caught.value)] == []
 
 
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
+def test_a_file_that_is_missing_or_comes_with_terrain_is_refused(
+    tmp_path: Path, users_mjcf: Callable[..., Path]
+) -> None:
     with pytest.raises(ModelMismatch, match=r"nothing\.xml: no such file"):
         MujocoPlant(tmp_path / "nothing.xml")
+    with pytest.raises(ConfigError, match="terrain"):
+        MujocoPlant(users_mjcf(), terrain=Boxes())
 
 
 @pytest.mark.parametrize("text", ["", "<mujoco>", "<mujoco><worldbody><cow/></worldbody></mujoco>"])
@@ -324,8 +328,3 @@ def test_a_model_that_does_not_compile_is_refused_with_the_reason(
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ModelMismatch, match=r"MuJoCo cannot compile (?s:.)*gone\.stl"):
         MujocoPlant(path)
-
-
-def test_terrain_is_refused_with_a_users_model(users_mjcf: Callable[..., Path]) -> None:
-    with pytest.raises(ConfigError, match="terrain"):
-        MujocoPlant(users_mjcf(), terrain=Boxes())
