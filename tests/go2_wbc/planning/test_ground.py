@@ -48,6 +48,7 @@ from go2_wbc.planning.ground import (
     ground_below,
     haste,
     is_rough,
+    landing_height,
     learn_ground,
     level_friction,
     note_stumble,
@@ -140,6 +141,15 @@ def test_the_robot_goes_slowly_on_rough_ground_and_for_a_way_after_it() -> None:
     ground.roughness, ground.slope[0] = 0.0, 2.0 * STEEP  # a ramp, that is as feet expect it
     carry_ground(ground, CONFIG, walking, 1.01 * CONFIG.way / 0.5 / STEEP_FORGETS)
     assert not is_rough(ground)
+
+
+def test_on_rough_ground_no_foot_is_led_above_the_highest_that_was_met() -> None:
+    ground = plane(on_plane(np.zeros(2)))
+    highest = ground.p_met[:, 2].max()
+    assert landing_height(ground, highest + 0.1) == highest + 0.1
+    ground.rough_way = 1.0
+    assert landing_height(ground, highest + 0.1) == highest
+    assert landing_height(ground, highest - 0.1) == highest - 0.1
 
 
 def test_the_robot_speeds_up_as_ground_and_motors_bear_it() -> None:
