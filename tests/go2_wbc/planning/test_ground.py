@@ -198,6 +198,12 @@ def test_an_upright_cone_lies_within_that_about_the_normal_of_a_slope(friction: 
     assert level_friction(ground, 0.1, 0.12) == 0.12
     learn(ground, on_plane(SLOPE, 0.5).p_world_feet, np.ones(4, dtype=bool))
     assert level_friction(ground, friction, 0.01) == pytest.approx(friction)  # as on stairs
+    ground.rough_way, ground.slope[:] = 0.0, 2.0 * SLOPE
+    walking = on_plane(SLOPE).replaced(v_world_com=np.array([0.5, 0.0, 0.0]))
+    carry_ground(ground, CONFIG, walking, 0.0)  # a ramp: smooth and steep
+    assert level_friction(ground, friction, 0.01) < friction - 0.1  # as behind it its crest is met
+    carry_ground(ground, CONFIG, walking, FIRST_WAY / 0.5)
+    assert level_friction(ground, friction, 0.01) == pytest.approx(friction)
     assert level_friction(plane(on_plane(np.zeros(2))), friction, 0.01) == friction
 
 
