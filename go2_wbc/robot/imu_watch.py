@@ -58,7 +58,7 @@ UNSEEN = 0.5
 """m^2 that is added to what feet tell of each axis of the gyro's error, and draws it towards 0: two
 feet tell nothing of a turn about the line between them. A pair adds 0.1 to 0.25 in each tick."""
 FINER = 1.0 / 3.0
-"""Share of the accelerometer's limit above which what is left of an error counts, too."""
+"""Share of either's limit above which what is left of an error counts, too."""
 FORCE_LIMIT, FORCE_LASTS, STAYING = 0.45, 0.25, 0.62
 """Error of the accelerometer [m/s^2] that is named, if it lasts so long [s] without falling below
 this share of what it was: what a blow leaves fades."""
@@ -229,7 +229,8 @@ def judge_gyro(m: WatchedImu, told: float, dt: float) -> None:
     explained = dot(error, triple(m.turned))
     most = UNEXPLAINED**2 * (m.turning[0, 0] + m.turning[1, 1] + m.turning[2, 2])
     is_off = explained > max(EXPLAINED * m.residual, m.residual - most)
-    is_off = is_off and dot(error, error) > GYRO_LIMIT**2
+    limit = GYRO_LIMIT * (FINER if m.gyro_is_off > 0.0 else 1.0)
+    is_off = is_off and dot(error, error) > limit**2
     m.gyro_time = m.gyro_time + told * dt if is_off else 0.0
     if m.gyro_time > GYRO_LASTS:
         m.gyro_is_off, m.refining = 1.0, REFINING
