@@ -145,6 +145,7 @@ STUDIES = (
     Study("ticks", speed_ticks.TICKS, speed_ticks.measure_ticks, "tick"),
     Study("estimated", speed_ticks.ESTIMATED, speed_ticks.measure_estimated),
     Study("commands", speed_ticks.COMMANDS, speed_ticks.measure_commands),
+    Study("sight", speed_ticks.SIGHT, speed_ticks.measure_sight),
     Study("checks", CHECKS, measure_checks, ""),
     Study("startup", STARTED, measure_startup),
     Study("realtime", speed_ticks.REALTIME, speed_ticks.measure_realtime),

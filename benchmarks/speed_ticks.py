@@ -19,7 +19,10 @@ from benchmarks.study import TrialResult
 from controller.go2_controller import GO2Controller
 from controller.pacing import Pacer
 from controller.sweeps.trials import Trial, TrialFailed
+from go2_wbc.planning.height_map import HeightMap, fuse
 from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.base import Scan
+from go2_wbc.plant.terrain import Stairs, Terrain
 
 PERIOD = 2000.0  # Robot time [us] of a tick
 TROT_TIME = 100  # Time [us] that a tick of the trot may take
@@ -30,6 +33,7 @@ COMMAND_TIME = 60.0
 FASTEST = (1.0, 0.4, 1.5)
 """Ahead and sideways [m/s], turning [rad/s]: the greatest of these commands."""
 ESTIMATED_TIME = 10.0  # Robot time [s] of the trot on sensors
+SIGHT_TIME = 10.0  # Robot time [s] of the stairs
 REAL_TIME = 60.0  # Time [s] of the trot at the wall clock's pace
 REPEATS = 3  # How often the same walk is done
 TRACED_TICKS = 500  # Ticks whose memory is traced
@@ -68,6 +72,15 @@ ESTIMATED = {
         ("worst", "worst by median", ""),
         ("least", "worst of the least of three runs", "<= 10"),
         ("factor", "real-time factor, scaled", ">= 10"),
+    )
+}
+SIGHT = {
+    "by lidar up 6 stairs of 16 cm, 0.3 m/s, on sensors": (
+        ("median", "tick, median", "us"),
+        ("more", "than blind on level ground, scaled", "<= 25 us"),
+        ("fused", "a scan fused, scaled", "<= 300 us"),
+        ("worst", "worst tick without its ray casting", "us"),
+        ("late", "ticks over their 2 ms", "<= 0"),
     )
 }
 REALTIME = {
@@ -138,6 +151,54 @@ def measure_estimated(trial: Trial, found: TrialResult) -> None:
     walks = np.array([_estimated(trial) for _ in range(REPEATS)])
     found.values = _tail(walks[0], walks.min(axis=0))
     found.values["factor"] = PERIOD / float(walks[0].mean()) * slow
+
+
+class _Scanning(MujocoPlant):
+    """Notes its scans, and the processor time [us] of each call for one."""
+
+    def __init__(self, seed: int, terrain: Terrain | None = None) -> None:
+        """``terrain``: of a robot that sees it; else it is blind."""
+        super().__init__(sensors="imu", seed=seed, terrain=terrain, lidar=terrain is not None)
+        self.scans, self.casting = list[Scan](), list[float]()
+
+    def scan(self) -> Scan | None:
+        begun = time.thread_time_ns()
+        found = super().scan()
+        self.casting.append((time.thread_time_ns() - begun) / 1e3)
+        self.scans += [found] if found else []
+        return found
+
+
+def measure_sight(trial: Trial, found: TrialResult) -> None:
+    """Ticks by sight up stairs beside blind ones; casting rays is the simulation's own work."""
+    slow = slowness(recorded_ticks(trial)[2])
+    blind, _ = _climbed(_Scanning(trial.seed))
+    spent, scans = _climbed(_Scanning(trial.seed, Stairs(0.16, 6, 0.31)))
+    take = partial(fuse, HeightMap(), p_world_base=np.zeros(3), R_world_base=np.eye(3))
+    fused = [
+        timed(partial(take, p_base_points=scan.p_base_points, deviation=scan.deviation), 1)
+        for scan in scans
+    ]
+    found.values = {
+        "median": float(np.median(spent)),
+        "more": float(np.median(spent) - np.median(blind)) / slow,
+        "fused": float(np.median(fused)) / slow,
+        "worst": float(spent.max()),
+        "late": float(np.sum(spent > PERIOD)),
+    }
+
+
+def _climbed(plant: _Scanning) -> tuple[np.ndarray, list[Scan]]:
+    """Time [us] of each tick less its ray casting, and the scans."""
+    with timed_robot(plant) as (go2, ends):
+        _require(go2, go2.walk())
+        go2.move(0.3)
+        ends.clear()
+        plant.casting.clear()
+        go2.wait(SIGHT_TIME)
+        _require(go2)
+        spent = np.diff(ends) / 1e3
+        return spent - plant.casting[1 : len(ends)], plant.scans
 
 
 def _tail(spent: np.ndarray, least: np.ndarray) -> dict[str, float]:

@@ -75,6 +75,13 @@ def test_ticks_on_sensors_with_planned_forces_are_timed(monkeypatch: pytest.Monk
     assert values["estimated.worst"] >= values["estimated.p99"] >= 1.0
 
 
+def test_ticks_by_sight_are_timed_without_their_rays(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(speed_ticks, "SIGHT_TIME", 0.5)
+    values = measured("sight")
+    assert values["sight.worst"] >= values["sight.median"] > 0.0
+    assert values["sight.fused"] > 0.0
+
+
 def test_a_start_is_measured_in_a_process_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(speed, "PROCESSES", 1)
     starts = {name: (what, "sum(range(10**6))", 1.0) for name, (what, _, _) in speed.STARTS.items()}
