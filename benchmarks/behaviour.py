@@ -11,8 +11,8 @@ from benchmarks.command import Benchmark
 from benchmarks.robots import standing_failure, way_between
 from benchmarks.study import Study, TrialResult
 from controller.sweeps.trials import Trial, TrialRobot
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.rotations import wrap_angle
 
 STAND = (

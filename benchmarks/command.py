@@ -12,8 +12,7 @@ from typing import Annotated, Any
 from benchmarks import store
 from benchmarks.report import render, summarise, threshold_text
 from benchmarks.study import IDEAL, IMU, Results, Study, Task, chosen_studies, run_tasks, tasks_of
-from controller.cli.common import ExitCode, output, print_json, reader
-from controller.cli.progress import ProgressLine
+from controller.cli.common import ExitCode, ProgressLine, output, print_json, reader
 from controller.cli.sweep import tell
 from controller.sweeps.run import SweepResult, sweep
 from go2_wbc.errors import ConfigError, MissingDependency

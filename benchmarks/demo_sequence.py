@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.high_five import highest_window
 from benchmarks.robots import standing_failure, way_between
 from benchmarks.study import Study, TrialResult
-from controller.demo.run import DemoProgress, run_demo
+from controller.demo.steps import DemoProgress, run_demo
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.rotations import wrap_angle

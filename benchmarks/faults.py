@@ -33,7 +33,7 @@ from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant.faults import AXES
 from go2_wbc.plant.mujoco.ground_truth import FALLEN_TILT, TOUCH
 from go2_wbc.recording import true_runs
-from go2_wbc.robot.profile import GO2
+from go2_wbc.robot.description import GO2
 from motions import load_motion
 
 FIRST_SEED = 10100
@@ -63,7 +63,8 @@ class Break:
         named: what the health calls a part.
         unjudged: states in which nothing can be noticed of it.
         at_once: whether all parts break.
-        is_of_paw: whether it is the raised leg's on three legs.
+        is_of_paw: whether it is the raised leg's on three legs; None for never, as a dead sensor
+            is right of a paw in the air.
         raised: range of the moment then [s].
     """
 
@@ -75,7 +76,7 @@ class Break:
     named: str = "{}"
     unjudged: tuple[str, ...] = ()
     at_once: bool = False
-    is_of_paw: bool = False
+    is_of_paw: bool | None = False
     raised: tuple[float, float] = RAISED
 
     @property
@@ -103,9 +104,9 @@ class Break:
 
     def broken(self, seed: int, state: str = "") -> tuple[str, ...]:
         """The parts that break in a trial."""
-        parts = self.parts
-        if self.is_of_paw and state == "three-legs":
-            parts = tuple(part for part in parts if part.startswith("FR"))
+        parts, is_of_paw = self.parts, self.is_of_paw
+        if is_of_paw is not False and state == "three-legs":
+            parts = tuple(part for part in parts if part.startswith("FR") is bool(is_of_paw))
         return parts if self.at_once else (parts[seed % len(parts)],)
 
 
@@ -224,7 +225,7 @@ ENCODERS = (
     Break("off", "encoder 0.1 rad off", "encoder", JOINT_NAMES),
 )
 FEET = (
-    Break("foot-dead", "foot's sensor dead", "foot_force", FOOT_NAMES),
+    Break("foot-dead", "foot's sensor dead", "foot_force", FOOT_NAMES, is_of_paw=None),
     Break("foot-40", "foot's sensor stuck at 40 N", "foot_force", FOOT_NAMES, 40.0),
     Break("feet-dead", "all feet's sensors dead", "foot_force", FOOT_NAMES, at_once=True),
 )

@@ -22,8 +22,8 @@ from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.recording import Recording
 from motions import Motion, Timeline, find_motion, motion_names
-from viz.render.animation import encoded_webp, frame_times
 from viz.render.frame_renderer import FrameRenderer, ShotStyle
+from viz.render.pictures import encoded_webp, frame_times
 
 LONG, FAST = 15.0, 2.0  # Length [s] from which on a motion is long, and is shown this much faster
 RATE = 25.0  # Samples of the recording a second [Hz]

@@ -24,8 +24,7 @@ from jaxtyping import Float, Int, UInt64
 
 from benchmarks.command import positive
 from benchmarks.golden_runs import KEPT_EVERY, RUNS, STAGES, Ledger, Values
-from controller.cli.common import ExitCode
-from controller.cli.progress import ProgressLine
+from controller.cli.common import ExitCode, ProgressLine
 from go2_wbc.errors import CommandError, ConfigError, unknown_name
 
 RECORD, COMPARE = "record", "compare"

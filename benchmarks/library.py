@@ -20,8 +20,8 @@ from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.reference import Anchor
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.rotations import wrap_angle
 from motions import compile_timeline, load_motion, motion_names
 

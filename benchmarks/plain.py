@@ -15,10 +15,8 @@ import numpy as np
 from benchmarks.command import Sensors
 from benchmarks.study import IDEAL
 from controller import GO2Controller
-from controller.cli.common import ExitCode
-from controller.cli.progress import ProgressLine
-from controller.demo.run import DemoProgress, run_demo
-from controller.demo.steps import StepResult
+from controller.cli.common import ExitCode, ProgressLine
+from controller.demo.steps import DemoProgress, StepResult, run_demo
 from go2_wbc.compilation import Kernel, all_kernels, call_plain, load_kernels
 from go2_wbc.plant import MujocoPlant
 

@@ -1,7 +1,7 @@
 """``python -m benchmarks qp_infeasibility``: answers where its constraints contradict it.
 
 Blind trots over boxes, pushes that throw the robot off its stride, and legs at the ends of their
-joints; random commands are in ``balance``. The limits of ``wbc.relaxation`` were chosen on box
+joints; random commands are in ``balance``. The limits of ``wbc.solvers`` were chosen on box
 layouts 0 to 5 and six pushes; no seed of theirs is judged here.
 """
 

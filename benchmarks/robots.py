@@ -16,9 +16,8 @@ from go2_wbc.legs import LEGS
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.plant.mujoco.model import JointDynamics, build_spec
-from go2_wbc.robot.description import find_description
+from go2_wbc.robot.description import find_description, find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from go2_wbc.robot.state import RobotState
 

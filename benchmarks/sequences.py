@@ -39,8 +39,8 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TOUCH, TruthRecording
 from go2_wbc.plant.terrain import Boxes, Slope
 from go2_wbc.reference import Anchor
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import find_profile
 from motions import CompiledPlan, compile_timeline, load_motion
 
 FOOT_RADIUS, STAND_HEIGHT = find_profile().foot_radius, find_profile().stand_height

@@ -6,8 +6,7 @@ says so. Plans that no motion needs any more are removed.
 
 from collections.abc import Iterator
 
-from controller.cli.common import ExitCode
-from controller.cli.progress import ProgressLine
+from controller.cli.common import ExitCode, ProgressLine
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline, find_motion, motion_names
 from motions.authoring import Choice

@@ -34,8 +34,8 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.plant.mujoco.model import JointDynamics
 from go2_wbc.plant.terrain import Boxes, Patch, Ramp, Slope, Stairs, Terrain
+from go2_wbc.robot.description import GO2, find_profile
 from go2_wbc.robot.motor import JointFriction
-from go2_wbc.robot.profile import GO2, find_profile
 from go2_wbc.robot.rotations import wrap_angle
 
 FIRST_SEED = 14200

@@ -13,8 +13,7 @@ from go2_wbc.robot.state import Snapshot
 from go2_wbc.tracking.landing import Landings
 from go2_wbc.tracking.plan_tracking import Deviation
 
-TOUCH_FORCE = 1.0
-"""Force [N] of the ground on trunk or legs that counts as a touch."""
+TOUCH_FORCE = 1.0  #: Force [N] of the ground on trunk or legs that counts as a touch
 TOUCH_TIME = 0.01
 """Time [s] for which they may touch it in a motion: what the benchmarks call a touch."""
 PAW_TOLERANCE = 0.03
@@ -30,15 +29,13 @@ JOINT_DEVIATION = 0.2
 END_PLACE = 0.05
 """Distance [m] from its planned end at which a motion that moves on may end: what is asked of a
 walk of 2 m."""
-END_HEADING = math.radians(4.0)
-"""Angle [rad] by which its end may be turned."""
+END_HEADING = math.radians(4.0)  #: Angle [rad] by which its end may be turned
 
 
 class Acceptance:
     """Watches a motion while it is played, and judges it."""
 
     def __init__(self, plan: MotionPlan, plant: Plant) -> None:
-        """Watch ``plan`` on ``plant``."""
         self._plan, self._plant, self._held = plan, plant, plan.held_feet
         self._touched = 0.0
         self._heights: list[list[float]] = [[] for _ in self._held]

@@ -9,11 +9,10 @@ from go2_wbc.config import Config, load_config
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.planning.command import finite_number
 from go2_wbc.plant.base import Plant
-from go2_wbc.robot.profile import GO2
+from go2_wbc.robot.description import GO2
 
 NAMESPACE = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
-LONGEST = 1e6
-"""Time [s] of one call: 11 days."""
+LONGEST = 1e6  #: Time [s] of one call: 11 days
 
 
 def require_pace(plant: Plant | None, *, realtime: bool) -> None:

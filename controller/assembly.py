@@ -26,8 +26,7 @@ from go2_wbc.wbc.tasks import Task
 if TYPE_CHECKING:
     from go2_wbc.plant.mujoco.viewer import PlantViewer
 
-RECORDED_TIME = 240.0
-"""Seconds of robot time that the telemetry keeps."""
+RECORDED_TIME = 240.0  #: Seconds of robot time that the telemetry keeps
 
 
 def build_pilot(

@@ -17,8 +17,7 @@ from controller.assembly import build_pilot
 from controller.modes import Aborted, Measurements, Mode, Outcome
 from controller.navigation import DriveStraight, TurnInPlace
 from controller.pacing import REASON, LogOnce
-from controller.seen_terrain import SeenTerrain
-from controller.telemetry import Telemetry
+from controller.telemetry import SeenTerrain, Telemetry
 from go2_wbc.arguments import typed
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
@@ -418,7 +417,6 @@ class GO2Controller:
         self.close()
 
     def __repr__(self) -> str:
-        """Who it is, what it does, and when."""
         plant = type(self._plant).__name__
         time = self._runner.loop.state.time
         return f"<GO2Controller {self._namespace}: {self.mode.value}, {plant}, {time:.2f} s>"

@@ -10,20 +10,19 @@ import base64
 import html
 
 from controller.report_view import planned, verdict_of
-from controller.seen_terrain import SeenTerrain
 from controller.sweeps.run import SweepResult
 from controller.sweeps.summary import summarise
+from controller.telemetry import SeenTerrain
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.recording import Recording
 from motions import CheckedMotion, CompiledPlan, FeasibilityChecker, FeasibilityReport, Timeline
 from viz.content import ReplayContent
 from viz.render.ground import ground_figure
-from viz.render.margin_plot import margin_figure
-from viz.replay.html_page import replay_html
+from viz.render.plots import margin_figure
+from viz.replay.page_data import replay_html
 from viz.style import png_of
 
-HEIGHT = 620
-"""Of a page [px]."""
+HEIGHT = 620  #: Of a page [px]
 LONGEST = 60.0
 """Motions and recordings that last longer [s] are not drawn unasked: the page would be large."""
 

@@ -40,29 +40,21 @@ Reply = Callable[[Outcome], None]
 
 @dataclass(slots=True, eq=False)
 class Job:
-    """Something to do.
+    """Something to do."""
 
-    Attributes:
-        name: what the user calls it.
-        act: does it and returns what was measured; raises ``Aborted`` or a ``Go2WbcError`` if it
-            was not done.
-        reply: is told what came of it, once.
-        prepare: slow work, done in a thread of its own before ``act``.
-        begin: called just before ``act``; returns why the job cannot begin, or nothing. A ``damp``
-            from now on must end ``act``.
-        phase: "preparing", "playing" or "returning".
-        is_cancelled: whether it has been called off.
-        start: robot time [s] at which its turn came.
-    """
-
-    name: str
+    name: str  #: what the user calls it
     act: Callable[[Job], Measurements]
-    reply: Reply
+    """Does it and returns what was measured; raises ``Aborted`` or a ``Go2WbcError`` if it was not
+    done."""
+    reply: Reply  #: is told what came of it, once
     prepare: Callable[[], None] | None = None
+    """Slow work, done in a thread of its own before ``act``."""
     begin: Callable[[], str] = lambda: ""
-    phase: str = "preparing"
-    is_cancelled: bool = False
-    start: float = 0.0
+    """Called just before ``act``; returns why the job cannot begin, or nothing. A ``damp`` from now
+    on must end ``act``."""
+    phase: str = "preparing"  #: "preparing", "playing" or "returning"
+    is_cancelled: bool = False  #: whether it has been called off
+    start: float = 0.0  #: robot time [s] at which its turn came
     _due: float = math.inf
     _is_prepared: bool = True
     _is_answered: bool = False
@@ -76,11 +68,6 @@ class JobServer(Generic[Robot]):
 
     Any thread may submit, cancel and damp, also while a job is carried out. That happens in the
     thread that calls ``work``, or in one of the server's own after ``start``; never in both.
-
-    Attributes:
-        robot: that carries them out.
-        job: what is being prepared or carried out, or None.
-        last: what came of the last job whose turn came, or None.
     """
 
     def __init__(self, robot: Robot, *, queue: int = 0, patience: float = math.inf) -> None:
@@ -91,10 +78,10 @@ class JobServer(Generic[Robot]):
             queue: jobs that may wait for their turn; with 0 a second one is refused.
             patience: time [s] after which ``expire`` answers a job that is not over.
         """
-        self.robot = robot
-        self.last: Outcome | None = None
+        self.robot = robot  #: that carries them out
+        self.last: Outcome | None = None  #: what came of the last job whose turn came, or None
         self._queue, self._patience = queue, patience
-        self.job: Job | None = None
+        self.job: Job | None = None  #: what is being prepared or carried out, or None
         self._waiting: deque[Job] = deque()
         self._changed = threading.Condition()
         self._end = ""

@@ -1,7 +1,7 @@
 """The control loop: one tick is read, check, snapshot, behaviour, whole-body QP, write, record.
 
 Where the QP's constraints contradict each other, the nearest answer is followed
-(``wbc.relaxation``) and the tick is counted; if they give way gravely for ``grave_limit_time``, the
+(``wbc.solvers``) and the tick is counted; if they give way gravely for ``grave_limit_time``, the
 robot is damped for good. Only here a QP failure is caught: the last good torque is held for one
 tick, then the robot is damped while the failure lasts, and for good after ``qp_patience`` ticks;
 every one is counted.
@@ -19,8 +19,7 @@ from math import inf, isfinite
 
 import numpy as np
 
-from controller.behaviours import Behaviour
-from controller.behaviours.joints import DAMPING, Damped
+from controller.behaviours import DAMPING, Behaviour, Damped
 from controller.pacing import REASON
 from controller.telemetry import Telemetry
 from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible
@@ -31,46 +30,30 @@ from go2_wbc.robot.foot_watch import PULLED, FootWatch
 from go2_wbc.robot.latency import LAGS, Latency
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor_watch import MotorWatch
-from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.payload_estimation import PayloadEstimator
+from go2_wbc.robot.rigid_body import NO_PAYLOAD, Payload
 from go2_wbc.robot.safety import FallDetector, SafetyConfig, is_plausible
 from go2_wbc.robot.state import Health, JointCommand, RobotState, Snapshot
 from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
-from go2_wbc.wbc.relaxation import is_grave
+from go2_wbc.wbc.solvers import is_grave
 
 _log = logging.getLogger(__name__)
 
-OLDEST_SCAN = 64
-"""Ticks by which a scan may be late."""
+OLDEST_SCAN = 64  #: Ticks by which a scan may be late
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Why the loop took the robot out of its behaviour.
+    """Why the loop took the robot out of its behaviour."""
 
-    Attributes:
-        reason: in plain words.
-        is_fall: whether the robot has fallen.
-        may_fall: whether it went limp in the middle of balancing, so that it may yet fall.
-    """
-
-    reason: str
-    is_fall: bool = False
+    reason: str  #: in plain words
+    is_fall: bool = False  #: whether the robot has fallen
     may_fall: bool = False
+    """Whether it went limp in the middle of balancing, so that it may yet fall."""
 
 
 class ControlLoop:
-    """Runs one behaviour at a time on a plant.
-
-    Attributes:
-        behaviour: what the robot does now.
-        snapshot: of the last tick; of a simulated robot when the tick's command acts.
-        latency: how late that is.
-        fault: why the last behaviour was ended by the loop, or None.
-        health: which parts are broken.
-        heights: of the ground, as it has been seen.
-        warn: writes a line of the log, as ``logging.Logger.warning`` does.
-    """
+    """Runs one behaviour at a time on a plant."""
 
     def __init__(
         self,
@@ -102,25 +85,27 @@ class ControlLoop:
         self._safety = safety
         self._falls = FallDetector(safety, model.profile)
         self._sag = self._lean = 0.0
-        self.fault: Fault | None = None
-        self.warn: Callable[..., None] = _log.warning
+        self.fault: Fault | None = None  #: why the last behaviour was ended by the loop, or None
+        self.warn: Callable[..., None] = _log.warning  #: writes a line of the log
         self.state: RobotState = plant.read()
         if not _is_plausible(self.state):
             raise PlantError(f"the first state of the plant is not finite: q={self.state.q}")
         self.snapshot: Snapshot = model.snapshot(self.state)
-        self.latency = Latency(plant.control_period)
+        """Of the last tick; of a simulated robot when the tick's command acts."""
+        self.latency = Latency(plant.control_period)  #: how late that is
         self._ahead = self.state
-        self.heights = HeightMap()
+        self.heights = HeightMap()  #: of the ground, as it has been seen
         self._past: deque[RobotState] = deque(maxlen=OLDEST_SCAN)
         self._payloads = payloads
         self._motors, self._held = MotorWatch(model.motor), np.zeros(4)
         self._feet = FootWatch(model.mass * model.gravity)
-        self.health = Health()
+        self.health = Health()  #: which parts are broken
         self._commands = deque([JointCommand.damping(DAMPING)], LAGS)
         self._unanswered = 0
         self._qp_failures_in_a_row, self._grave_since = 0, inf
         is_up = self.state.tilt < safety.tilt_limit  # one that is found on its back has not fallen
         self.behaviour: Behaviour = Damped("lying", stays_on_belly=is_up)
+        """What the robot does now."""
         self.engage(self.behaviour)
 
     def engage(self, behaviour: Behaviour, *, observe: bool = True) -> None:

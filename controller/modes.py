@@ -33,8 +33,7 @@ class Mode(Enum):
         return self in (Mode.STANDING, Mode.SITTING, Mode.WALKING, Mode.MOVING)
 
 
-Measurements = Mapping[str, float]
-"""Measured quantities by name with unit."""
+Measurements = Mapping[str, float]  #: Measured quantities by name with unit
 Limited = Mapping[str, tuple[float, float | None]]
 """What was measured, by name with unit: the value, and what it must stay below, if anything."""
 
@@ -64,7 +63,6 @@ class Outcome:
     __repr__ = brief
 
     def __bool__(self) -> bool:
-        """Truth of the outcome is ``ok``."""
         return self.ok
 
 
@@ -101,30 +99,23 @@ def listed(measured: Measurements) -> str:
     return ", ".join(f"{name} {value:.3g}" for name, value in measured.items())
 
 
-STILL_SPEED = 0.05
-"""Speed [m/s] of the base below which it counts as still."""
+STILL_SPEED = 0.05  #: Speed [m/s] of the base below which it counts as still
 CALM_SPEED = 0.012
 """Speed [m/s] of the CoM below which a robot that has walked counts as at rest: it shifts its trunk
 by 0.01 (``planning.rest``), and its sensors may be off by the difference to 0.02."""
-STILL_JOINTS = 0.5
-"""Joint speed [rad/s] below which a leg counts as still."""
-HEIGHT_TOLERANCE = 0.02
-"""Distance [m] from the asked height that still counts as there."""
-ANGLE_TOLERANCE = 0.1
-"""Angle [rad] from the asked attitude that still counts as there."""
-LYING_HEIGHT = 0.13
-"""Height [m] of the base above the lowest foot below which the robot is down."""
+STILL_JOINTS = 0.5  #: Joint speed [rad/s] below which a leg counts as still
+HEIGHT_TOLERANCE = 0.02  #: Distance [m] from the asked height that still counts as there
+ANGLE_TOLERANCE = 0.1  #: Angle [rad] from the asked attitude that still counts as there
+LYING_HEIGHT = 0.13  #: Height [m] of the base above the lowest foot below which the robot is down
 SETTLED = 0.015
 """Height [m] of the base above where it goes limp below which the belly is down: that of a file
 with other hulls lies 1 cm higher."""
-LYING_TILT = 0.5
-"""Angle [rad] from the vertical below which a robot lies on its belly."""
+LYING_TILT = 0.5  #: Angle [rad] from the vertical below which a robot lies on its belly
 LEANING = 0.4
 """Tilt [rad] beyond which a robot sits, or tips over, and does not stand: twice a steep slope's."""
 MOVING_SPEED = 0.3
 """Speed [m/s] of the base beyond which a robot moves: one that stood sinks as fast after 0.1 s."""
-FOLD_TOLERANCE = 0.5
-"""Angle [rad] from the tucked legs' joints that still counts as folded."""
+FOLD_TOLERANCE = 0.5  #: Angle [rad] from the tucked legs' joints that still counts as folded
 
 
 def unfolded_legs(snapshot: Snapshot) -> list[Leg]:

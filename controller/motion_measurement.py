@@ -28,8 +28,7 @@ from motions.dynamics.phases import PhaseProblem
 from motions.feasibility.goal_errors import misses_of
 from motions.plan.compiled_plan import CompiledPlan, DynamicSpan
 
-STRIDE = 5
-"""Every fifth tick is compared with what was written."""
+STRIDE = 5  #: Every fifth tick is compared with what was written
 LANDED = 0.1
 """Time [s] after a touchdown at which the place of a foot counts: it has its load by then."""
 
@@ -93,8 +92,7 @@ def _off_curves(
     recorded: TruthRecording, plan: MotionPlan, anchor: Anchor, solved: Bool[np.ndarray, " n"]
 ) -> Float[np.ndarray, "4"]:
     """Trunk and feet against the plan's curves, where no part is solved."""
-    rows = np.flatnonzero(~solved[::STRIDE]) * STRIDE
-    truth = recorded.part(rows)
+    truth = recorded.part(np.flatnonzero(~solved[::STRIDE]) * STRIDE)
     asked = placed(plan, truth.time - recorded.time[0], anchor)
     trunk, turned = trunk_off(asked, truth), turned_off(asked, truth)
     stance = asked["legs"] == STANCE
@@ -143,10 +141,8 @@ def _landings(asked: PhaseProblem) -> Bool[np.ndarray, "k 4"]:
     return ~stands & np.vstack([stands[1:], stands[-1:]])
 
 
-HALF_LENGTH = 0.2
-"""Distance [m] from the trunk's middle to its ends: what a wrong attitude moves."""
-FULL = 0.999
-"""Share of a torque limit from which on a motor gives all it has."""
+HALF_LENGTH = 0.2  #: Distance [m] from the trunk's middle to its ends: what a wrong attitude moves
+FULL = 0.999  #: Share of a torque limit from which on a motor gives all it has
 SETTLED_CONTACT = 0.1
 """Time [s] after a touchdown, and before a lift-off, in which an unloaded foot may skid."""
 
@@ -158,45 +154,29 @@ OF_FEET = ("feet_off", "paw_off", "landed_off")
 class MotionMeasurement:
     """What was measured while a motion was played.
 
-    Attributes:
-        fall: why the robot fell, or went limp because it fell, or None.
-        said: what ``play`` said.
-        reason: in its words.
-        slip: largest distance [m] that the material of a standing foot slid at its contact point.
-        torque, speed: largest share of a joint's torque and speed limit.
-        saturated: time [s] in which some motor gave all it has.
-        tracking: largest distance [m] of the CoM from its plan.
-        ends_off: largest distance [m] of the trunk's ends from their plan, seen from its middle.
-        feet_off: largest distance [m] of a raised foot from its plan, seen from the trunk.
-        joint_distance: least distance [rad] of a joint to its limit.
-        stopped: time [s] in which a joint pressed against the stop at its limit.
-        touched: time [s] in which a knee or the trunk touched the ground, or a link another.
-        trunk_off: largest distance [m] of the trunk from what was written.
-        turned_off: largest angle [rad] of the trunk from what was written.
-        paw_off: largest distance [m] of a foot in the air from its place in the world.
-        landed_off: largest distance [m] of a foot that came down from its place.
-
     The last four count from where the robot stood at first, and where a part is solved, from where
     it stood then: at the ends of its phases, what was asked there.
     """
 
-    fall: str | None
-    said: bool
-    reason: str
+    fall: str | None  #: why the robot fell, or went limp because it fell, or None
+    said: bool  #: what ``play`` said
+    reason: str  #: in its words
     slip: float
-    torque: float
-    speed: float
-    saturated: float
-    tracking: float
+    """Largest distance [m] that the material of a standing foot slid at its contact point."""
+    torque: float  #: largest share of a joint's torque limit
+    speed: float  #: largest share of a joint's speed limit
+    saturated: float  #: time [s] in which some motor gave all it has
+    tracking: float  #: largest distance [m] of the CoM from its plan
     ends_off: float
-    feet_off: float
-    joint_distance: float
-    stopped: float
-    touched: float
-    trunk_off: float
-    turned_off: float
-    paw_off: float
-    landed_off: float
+    """Largest distance [m] of the trunk's ends from their plan, seen from its middle."""
+    feet_off: float  #: largest distance [m] of a raised foot from its plan, seen from the trunk
+    joint_distance: float  #: least distance [rad] of a joint to its limit
+    stopped: float  #: time [s] in which a joint pressed against the stop at its limit
+    touched: float  #: time [s] in which a knee or the trunk touched the ground, or a link another
+    trunk_off: float  #: largest distance [m] of the trunk from what was written
+    turned_off: float  #: largest angle [rad] of the trunk from what was written
+    paw_off: float  #: largest distance [m] of a foot in the air from its place in the world
+    landed_off: float  #: largest distance [m] of a foot that came down from its place
 
     @property
     def ok(self) -> bool:
@@ -315,12 +295,10 @@ OFF_TRUNK, OFF_TURN, OFF_PAW, OFF_LANDING = 0.030, math.radians(8.0), 0.030, 0.0
 SOLVED_OFF, SOLVED_LANDING = 0.050, 0.040
 """The same where a part is solved: the tolerance that a timeline gives by itself, and how near its
 place a jump must land."""
-SLIP = 0.010
-"""Distance [m] that a standing foot may slide."""
+SLIP = 0.010  #: Distance [m] that a standing foot may slide
 MOMENT = 0.010
 """Time [s] for which motors may be saturated, joints on a stop, and what must not touch touch."""
-BEYOND = 0.02
-"""Angle [rad] by which a joint may be past its limit."""
+BEYOND = 0.02  #: Angle [rad] by which a joint may be past its limit
 
 
 def failures_of(run: MotionMeasurement, plan: MotionPlan) -> tuple[str, ...]:

@@ -11,12 +11,9 @@ from go2_wbc.planning.command import VelocityCommand, finite_number
 from go2_wbc.robot.rotations import wrap_angle
 from go2_wbc.robot.state import RobotState
 
-TURN_RATE = 1.0
-"""Greatest turning rate [rad/s] of a goal."""
-WALK_SPEED = 0.4
-"""Greatest speed [m/s] of a goal."""
-APPROACH = 2.0
-"""Speed per remaining way [1/s]: the robot slows down before its goal."""
+TURN_RATE = 1.0  #: Greatest turning rate [rad/s] of a goal
+WALK_SPEED = 0.4  #: Greatest speed [m/s] of a goal
+APPROACH = 2.0  #: Speed per remaining way [1/s]: the robot slows down before its goal
 HEADING_TOLERANCE = math.radians(1.5)
 DISTANCE_TOLERANCE = 0.02
 GREATEST_TURN = 2 * math.pi
@@ -26,17 +23,13 @@ GREATEST_DISTANCE = 100.0
 
 
 class Goal(ABC):
-    """A walk with a measured goal.
-
-    Attributes:
-        name: says what is walked.
-        time_limit: time [s] in which it must end: three times as long as at full speed.
-    """
+    """A walk with a measured goal."""
 
     def __init__(self, name: str, asked: float, speed: float) -> None:
         """Args: asked: way or angle, walked at ``speed`` per second."""
         self.name, self._asked = name, asked
         self.time_limit = 3.0 * abs(asked) / speed + 8.0
+        """Time [s] in which it must end: three times as long as at full speed."""
 
     def begin(self, state: RobotState) -> None:
         """Note where it starts."""

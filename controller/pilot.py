@@ -11,27 +11,15 @@ import threading
 from collections.abc import Callable
 from functools import partial
 
+from controller import modes
 from controller.acceptance import Acceptance
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.standing import Standing
-from controller.modes import (
-    LYING_HEIGHT,
-    Aborted,
-    Measurements,
-    Mode,
-    base_height,
-    is_standing,
-    listed,
-    lying,
-    sitting,
-    standing,
-    told,
-    why_not_standing,
-)
+from controller.modes import Aborted, Measurements, Mode
 from controller.navigation import Goal
 from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
-from controller.seen_terrain import SeenTerrain
+from controller.telemetry import SeenTerrain
 from controller.walker import Walker
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
@@ -39,13 +27,10 @@ from go2_wbc.errors import DynamicMotionRefused, ModeError, StanceMismatch
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.trunk import LEVEL, BodyPose
-from go2_wbc.plant import Plant
 from motions.postures import lie_down, rise, sit_down, sit_raise
 
-READY_TIME = 0.2
-"""Time [s] that a robot is given to stand ready in walking mode."""
-HOLD_TIME = 0.4
-"""Time [s] in which a robot that stands takes the exact posture."""
+READY_TIME = 0.2  #: Time [s] that a robot is given to stand ready in walking mode
+HOLD_TIME = 0.4  #: Time [s] in which a robot that stands takes the exact posture
 LOOK_TIME = 0.03
 """Time [s] for which a limp robot's feet are looked at: one that stands sinks by 3 mm."""
 
@@ -54,10 +39,11 @@ class Pilot:
     """Runs procedures on one loop.
 
     Attributes:
-        mode: what the robot is doing.
-        playing: the behaviour that plays a motion, or None.
+        mode, playing: what the robot is doing; the behaviour that plays a motion, or None.
         runner: lets time pass; ``runner.loop`` has the newest state and the telemetry.
         close: go limp and stop; the plant stays open. Idempotent.
+        collapse: goes limp at once, for a reason; ends the procedure that runs, from any thread.
+        excess: how far a command is beyond what is followed (0 if not, 2 by far), and in words.
     """
 
     def __init__(self, runner: Runner, config: Config) -> None:
@@ -66,6 +52,7 @@ class Pilot:
         self.close: Callable[[], None] = runner.close
         self._loop, self._config = runner.loop, config
         self._walker = Walker(runner, config)
+        self.excess, self.collapse = self._walker.excess, runner.interrupt
         self._goal: Goal | None = None
         self._commands = threading.Lock()  # held to take one, and to begin what takes none
         self.playing: PlayPlan | None = None
@@ -85,10 +72,6 @@ class Pilot:
     def command(self) -> VelocityCommand:
         """The velocity command that is being followed."""
         return self._walker.command if self.mode is Mode.WALKING else ZERO_COMMAND
-
-    def excess(self, command: VelocityCommand) -> tuple[int, str]:
-        """How far ``command`` is beyond what is followed (0 if not, 2 by far), and in words."""
-        return self._walker.excess(command)
 
     @property
     def terrain(self) -> SeenTerrain | None:
@@ -128,13 +111,13 @@ class Pilot:
             return self.stand()
         loop = self._loop
         self._runner.advance_until(lambda: bool(loop.state.feet_in_contact.all()), LOOK_TIME)
-        if why_not := self._runner.between_ticks(lambda: why_not_standing(loop.snapshot)):
+        if why_not := self._runner.between_ticks(lambda: modes.why_not_standing(loop.snapshot)):
             raise Aborted(f"the robot does not stand: {why_not}", self._runner.measurements())
         return self._rise(Posture.STAND, 1.2)
 
     def _rise(self, entry: Posture, duration: float) -> Measurements:
         self._take_posture(self._make_standing(entry, duration))
-        if self._runner.settles(is_standing):
+        if self._runner.settles(modes.is_standing):
             return self._arrive(Posture.STAND)
         # It stands on other ground than it believed in as it began: feet slid, or left a box.
         self._runner.stop_stepping()
@@ -274,9 +257,9 @@ class Pilot:
         if was_halted:
             raise Aborted(f"{goal.name} ended by stop()", measured)
         if blocked:
-            raise Aborted(f"{goal.name} ended: {blocked}; {listed(measured)}", measured)
-        if why := told(goal.errors(loop.state)):
-            raise Aborted(f"{goal.name} missed: {why}; {listed(measured)}", measured)
+            raise Aborted(f"{goal.name} ended: {blocked}; {modes.listed(measured)}", measured)
+        if why := modes.told(goal.errors(loop.state)):
+            raise Aborted(f"{goal.name} missed: {why}; {modes.listed(measured)}", measured)
         return measured
 
     def halt(self) -> bool:
@@ -308,8 +291,13 @@ class Pilot:
         plant = self._loop.plant
         if stands_up:
             self._ensure_standing()
-        if not allow_dynamic:
-            _refuse_dynamic_on_hardware(plan, plant)
+        if plan.is_dynamic and plant.is_hardware and not allow_dynamic:
+            raise DynamicMotionRefused(
+                f"motion {plan.name!r} is dynamic: fewer than three feet carry the robot in parts "
+                f"of it, so it cannot be stopped there, and {type(plant).__name__} may move a "
+                "robot. No dynamic motion of this project was tried on one. To play it all the "
+                "same: play(..., allow_dynamic=True)"
+            )
         self._meet_entry(plan)
         behaviour = PlayPlan(plan, self._config.wbc.joint_friction)
         acceptance = Acceptance(plan, plant)
@@ -362,10 +350,6 @@ class Pilot:
 
     # --- helpers --------------------------------------------------------------------------
 
-    def collapse(self, reason: str) -> None:
-        """Go limp at once; ends the procedure that runs. Any thread may call it."""
-        self._runner.interrupt(reason)
-
     def wait(self, seconds: float) -> Measurements:
         """Let time pass, whatever happens in it; a fault ends up in ``mode``."""
         known_fault = self._loop.fault
@@ -377,23 +361,12 @@ class Pilot:
 
     @property
     def _is_on_the_ground(self) -> bool:
-        return base_height(self._loop.snapshot) < LYING_HEIGHT
+        return modes.base_height(self._loop.snapshot) < modes.LYING_HEIGHT
 
 
 _RESTING = {
-    Posture.LIE: (Mode.LYING, lying),
-    Posture.SIT: (Mode.SITTING, sitting),
-    Posture.STAND: (Mode.STANDING, standing),
+    Posture.LIE: (Mode.LYING, modes.lying),
+    Posture.SIT: (Mode.SITTING, modes.sitting),
+    Posture.STAND: (Mode.STANDING, modes.standing),
 }
 """The mode of a robot that rests in a posture, and what is asked of it then."""
-
-
-def _refuse_dynamic_on_hardware(plan: MotionPlan, plant: Plant) -> None:
-    """Raise ``DynamicMotionRefused`` for a dynamic plan on a plant that may be a robot."""
-    if plan.is_dynamic and plant.is_hardware:
-        raise DynamicMotionRefused(
-            f"motion {plan.name!r} is dynamic: fewer than three feet carry the robot in parts "
-            f"of it, so it cannot be stopped there, and {type(plant).__name__} may move a "
-            "robot. No dynamic motion of this project was tried on one. To play it all the "
-            "same: play(..., allow_dynamic=True)"
-        )

@@ -13,33 +13,24 @@ from collections.abc import Iterator
 import numpy as np
 from jaxtyping import Float
 
-from controller.behaviours import Behaviour
-from controller.behaviours.joints import Damped, ServoJoints
+from controller.behaviours import Behaviour, Damped, ServoJoints
 from controller.loop import ControlLoop
 from controller.modes import unfolded_legs
 from controller.runner import Runner
 from go2_wbc.legs import LEGS, Leg
 
-ON_BELLY = 0.6
-"""Tilt [rad] below which the robot lies on its belly."""
-TUCK_TIME = 0.9
-"""Time [s] of drawing the feet under the hips while lying."""
-SPLAY_TIME = 0.5
-"""Time [s] of spreading the folded legs until the belly is on the ground."""
-LIMP_TIME = 0.6
-"""Time [s] for which the robot is left to sink before it counts as lying."""
-STEP_LIMIT = 4.0
-"""Time [s] in which one step of rolling over must end."""
-GRACE = 0.5
-"""Time [s] by which a servo may end later than planned."""
-TRIES = 6
-"""How often it rolls, or frees a leg, before it gives up."""
+ON_BELLY = 0.6  #: Tilt [rad] below which the robot lies on its belly
+TUCK_TIME = 0.9  #: Time [s] of drawing the feet under the hips while lying
+SPLAY_TIME = 0.5  #: Time [s] of spreading the folded legs until the belly is on the ground
+LIMP_TIME = 0.6  #: Time [s] for which the robot is left to sink before it counts as lying
+STEP_LIMIT = 4.0  #: Time [s] in which one step of rolling over must end
+GRACE = 0.5  #: Time [s] by which a servo may end later than planned
+TRIES = 6  #: How often it rolls, or frees a leg, before it gives up
 REACHED_BACK = (-0.3, 3.4, -2.66)
 """Joint angles [rad] of a left leg folded past the back, and inwards."""
 PUSHING = (0.8, 3.4, -0.9)
 """Joint angles [rad] of a left leg stretched past the back and outwards: it lifts its side."""
-OUTWARDS = 0.7
-"""Hip angle [rad] at which a left leg swings past the trunk without touching it."""
+OUTWARDS = 0.7  #: Hip angle [rad] at which a left leg swings past the trunk without touching it
 
 
 def tuck(runner: Runner) -> None:

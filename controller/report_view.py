@@ -17,17 +17,14 @@ from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from motions import CheckedMotion, CompiledPlan, FeasibilityReport, Finding
 from motions.authoring import Choice, Parameter
-from motions.dynamics.projection import PlanTarget
+from motions.dynamics.solver import PlanTarget
 from motions.feasibility import Series
 from motions.plan.trajectory import as_written
 from viz.content import CENTRE_OF_MASS, Annotation, MarginCurve, ReplayContent, Slider, Verdict
 
-AFTERWARDS = "afterwards"
-"""Label of what is shown of a run after its motion."""
-_AFTERWARDS = 1.0
-"""How long [s] a run is shown after the end of its motion."""
-_TOGETHER = 0.05
-"""Annotations on one limit that are this close in time [s] become one."""
+AFTERWARDS = "afterwards"  #: Label of what is shown of a run after its motion
+_AFTERWARDS = 1.0  #: How long [s] a run is shown after the end of its motion
+_TOGETHER = 0.05  #: Annotations on one limit that are this close in time [s] become one
 _LEAST_SAMPLES = 2
 _MOVED, _TURNED = 0.02, np.radians(2.0)
 """A motion that ends farther from its start, [m] and [rad], moves on."""
@@ -104,7 +101,8 @@ def verdict_of(report: FeasibilityReport) -> Verdict:
         text += f", {counted(tight, 'tight margin')}"
     margins, enough = report.margins, _LEAST_SAMPLES
     judged = [s for s in report.series if len(s.times) >= enough and s.check in margins]
-    judged.sort(key=lambda item: _share_left(margins[item.check]))
+    left = {check: one.margin / max(abs(one.limit), 1e-9) for check, one in margins.items()}
+    judged.sort(key=lambda item: left[item.check])  # shares, as limits are of different units
     findings = (*report.failures, *report.warnings)
     return Verdict(
         ok=report.ok,
@@ -207,11 +205,6 @@ def _curve(series: Series) -> MarginCurve:
         worst=known.argmin(axis=1),
         tight=series.tight,
     )
-
-
-def _share_left(finding: Finding) -> float:
-    """Margin over limit: what orders limits of different units."""
-    return finding.margin / max(abs(finding.limit), 1e-9)
 
 
 def _part(run: Recording, name: str) -> Recording:

@@ -15,21 +15,12 @@ from contextlib import suppress
 from typing import NoReturn, TypeVar
 from weakref import WeakValueDictionary
 
+from controller import modes
 from controller.behaviours import Behaviour
 from controller.behaviours.standing import Standing
-from controller.errands import NOT_YET, BackgroundLog, Errands, LoopEnded, LoopHangs, Pending
 from controller.loop import ControlLoop, Fault
-from controller.modes import (
-    Aborted,
-    Limited,
-    Measurements,
-    are_within,
-    listed,
-    posture_measurements,
-    standing,
-    told,
-)
-from controller.pacing import Pacer
+from controller.modes import Aborted, Limited, Measurements
+from controller.pacing import NOT_YET, BackgroundLog, Errands, LoopEnded, LoopHangs, Pacer, Pending
 from go2_wbc.errors import ClosedError, ModeError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.state import Snapshot
@@ -40,19 +31,14 @@ GREATEST_LAG = 0.1
 """Lag [s] behind the wall clock after which the pace is given up and taken up anew."""
 LEAST_PAUSE = 1e-4
 """Least pause [s] between two ticks, in which other threads get hold of the interpreter."""
-POLL = 0.001
-"""Time [s] after which a thread that interrupts another one's call looks again."""
-SETTLE_LIMIT = 3.0
-"""Time [s] in which a posture must come to rest after its motion."""
-STEPS_LIMIT = 4.0
-"""Time [s] in which steps for balance must come to rest."""
-CALM_TIME = 0.1
-"""Time [s] for which a posture must hold without a break."""
+POLL = 0.001  #: Time [s] after which a thread that interrupts another one's call looks again
+SETTLE_LIMIT = 3.0  #: Time [s] in which a posture must come to rest after its motion
+STEPS_LIMIT = 4.0  #: Time [s] in which steps for balance must come to rest
+CALM_TIME = 0.1  #: Time [s] for which a posture must hold without a break
 REST_TIME = 0.3
 """The same [s] of rest after a walk: for half of that a trunk that the last step has left 15 mm off
 its height is slow while it turns round, and then moves on at 0.02 to 0.03 m/s."""
-ROUNDING = 1e-9
-"""Time [s] by which a sum of control periods may miss its end."""
+ROUNDING = 1e-9  #: Time [s] by which a sum of control periods may miss its end
 SINK_TIME = 1.0
 """Time [s] for which a robot that went limp on its feet is watched: it sinks, or it falls."""
 HANG_LIMIT = 2.0
@@ -263,8 +249,10 @@ class Runner:
         self, what: str, asked: Callable[[Snapshot], Limited], calm_time: float = CALM_TIME
     ) -> None:
         """Let time pass until what is ``asked`` has been within its limits for ``calm_time`` s."""
-        if not self.settles(lambda now: are_within(asked(now)), calm_time):
-            why = told(asked(self.loop.snapshot)) or f"not for {calm_time:g} s without a break"
+        if not self.settles(lambda now: modes.are_within(asked(now)), calm_time):
+            why = (
+                modes.told(asked(self.loop.snapshot)) or f"not for {calm_time:g} s without a break"
+            )
             raise self._aborted(f"{what} not done within {SETTLE_LIMIT:.1f} s: {why}")
 
     def settles(self, check: Callable[[Snapshot], bool], calm_time: float = CALM_TIME) -> bool:
@@ -290,7 +278,8 @@ class Runner:
     ) -> None:
         """Let time pass until ``is_done()``, for ``limit`` seconds at most; tells ``why_not``."""
         if not self._comes(is_done, limit):
-            raise self._late(what, limit, why_not())
+            said = ", ".join(filter(None, (why_not(), modes.listed(self.measurements()))))
+            raise self._aborted(f"{what} not done within {limit:.1f} s: {said}")
 
     def _comes(self, is_done: Callable[[], bool], limit: float) -> bool:
         """Whether ``is_done()`` came within ``limit`` seconds; a fault is raised."""
@@ -304,10 +293,6 @@ class Runner:
             raise self._aborted(fault.reason)
         return False
 
-    def _late(self, what: str, limit: float, why_not: str = "") -> Aborted:
-        parts = ", ".join(part for part in (why_not, listed(self.measurements())) if part)
-        return self._aborted(f"{what} not done within {limit:.1f} s: {parts}")
-
     @property
     def is_stepping(self) -> bool:
         """Whether a standing robot steps for balance now."""
@@ -318,7 +303,7 @@ class Runner:
         """Wait until a robot that steps for balance stands again."""
         if self.is_stepping:
             self.until(lambda: not self.is_stepping, STEPS_LIMIT, "stand again")
-            self.settle("stand again", standing)
+            self.settle("stand again", modes.standing)
 
     def let_pass(self, seconds: float) -> None:
         """Let time pass, whatever happens in it."""
@@ -333,7 +318,7 @@ class Runner:
 
     def measurements(self) -> Measurements:
         """What is measured now."""
-        return posture_measurements(self.loop.snapshot)
+        return modes.posture_measurements(self.loop.snapshot)
 
     def _aborted(self, reason: str) -> Aborted:
         return Aborted(reason, self.measurements())

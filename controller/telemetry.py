@@ -1,22 +1,25 @@
-"""Telemetry: every tick recorded in a ring, and peaks over the whole run."""
+"""Telemetry: every tick recorded in a ring, peaks over the whole run, and the ground as seen."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
 from dataclasses import dataclass, replace
+from typing import final
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from go2_wbc.arguments import typed
+from go2_wbc.brief import inline_html
 from go2_wbc.errors import CommandError
 from go2_wbc.geometry import moving_support_margins
-from go2_wbc.planning.height_map import CELL, HeightMap, cells
+from go2_wbc.planning.height_map import CELL, HeightMap, cells, heights_at
 from go2_wbc.recording import Recording
 from go2_wbc.records import Array3, ArrayNx3, Record, layout_of, packed
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import note_peaks
-from go2_wbc.robot.payload import NO_PAYLOAD
+from go2_wbc.robot.rigid_body import NO_PAYLOAD
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.validation import LARGEST, is_finite_number
 
@@ -52,7 +55,7 @@ class Telemetry:
     Attributes:
         qp_failures: ticks in which the QP had no solution, over the whole run.
         relaxed_ticks: ticks in which constraints of the QP had to give way.
-        grave_ticks: those of them in which they gave way by more than ``wbc.relaxation.LIMITS``.
+        grave_ticks: those of them in which they gave way by more than ``wbc.solvers.LIMITS``.
         payload: what the robot is believed to carry beside its own parts.
         missed_deadlines: ticks that were not done when the next was due, at the wall clock's pace.
     """
@@ -72,7 +75,6 @@ class Telemetry:
         self.qp_failures = self.relaxed_ticks = self.grave_ticks = self.missed_deadlines = 0
 
     def __repr__(self) -> str:
-        """How many ticks, and of how many it had to give way."""
         return f"<Telemetry: {self._count} ticks, {self.relaxed_ticks} relaxed>"
 
     def record(self, snapshot: Snapshot, stance: Bool[np.ndarray, "4"], label: str) -> None:
@@ -162,17 +164,12 @@ class Telemetry:
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Copied ticks whose support margins are still to be computed, away from the control loop.
+    """Copied ticks whose support margins are still to be computed, away from the control loop."""
 
-    Attributes:
-        unfinished: the recording, its support margins nan.
-        p_world_feet: (n, 4, 3) foot centres [m].
-        grounds: cells of ground that were seen, the newest map first.
-    """
-
-    unfinished: Recording
-    p_world_feet: Float[np.ndarray, "n 4 3"]
+    unfinished: Recording  #: the recording, its support margins nan
+    p_world_feet: Float[np.ndarray, "n 4 3"]  #: (n, 4, 3) foot centres [m]
     grounds: tuple[Float[np.ndarray, "_ 3"], ...]
+    """Cells of ground that were seen, the newest map first."""
 
     def recording(self) -> Recording:
         """The finished recording."""
@@ -185,3 +182,37 @@ class Samples:
         ground = np.concatenate(self.grounds)
         _, newest = np.unique(np.floor(ground[:, :2] / CELL), axis=0, return_index=True)
         return replace(self.unfinished, support_margin=margins, ground=ground[newest])
+
+
+@final
+class SeenTerrain:
+    """Heights of the ground in the world of ``go2.state``, in cells of 2.5 cm, 4 m around.
+
+    Attributes:
+        blocked: what the robot has stopped in front of, in plain words; "" if its way is free.
+    """
+
+    _repr_html_ = inline_html
+
+    def __init__(self, heights: HeightMap, blocked: str) -> None:
+        """Look at ``heights``, which change as the robot walks on."""
+        self._heights, self.blocked = heights, blocked
+
+    @typed(error=CommandError)
+    def height(self, x: float, y: float) -> float:
+        """Of the ground at a place [m]; nan where nothing has been seen."""
+        z = np.empty(1)
+        heights_at(self._heights, np.array([[x, y]]), z)
+        return float(z[0])
+
+    def points(self) -> Float[np.ndarray, "n 3"]:
+        """Middles of all cells that have been seen [m]."""
+        return cells(self._heights)
+
+    def __repr__(self) -> str:
+        z = self.points()[:, 2]
+        way = f"blocked: {self.blocked}" if self.blocked else "way free"
+        if not len(z):
+            return f"<SeenTerrain: nothing seen, {way}>"
+        area = len(z) * CELL**2
+        return f"<SeenTerrain: {area:.1f} m^2, {z.min():.2f} to {z.max():.2f} m, {way}>"

@@ -16,16 +16,14 @@ from typing import Any, final
 from controller.go2_controller import GO2Controller
 from controller.jobs import Job, JobServer
 from controller.modes import Aborted, Measurements, Mode, Outcome
-from go2_wbc.errors import ClosedError, Go2WbcError
-from go2_wbc.extras import install_line
+from go2_wbc.errors import ClosedError, Go2WbcError, install_line
 from go2_wbc.planning.command import VelocityCommand
 
 DEAD_ZONE = 0.12
 """Share of a stick's way around its middle that counts as none (own choice: worn sticks)."""
 AHEAD, ASIDE, TURNING = 1.0, 0.4, 1.5
 """Speeds [m/s] and turning rate [rad/s] of a stick that is pushed to its end."""
-LEFT_X, LEFT_Y, RIGHT_X = 0, 1, 3
-"""Axes of the sticks; right and down are positive."""
+LEFT_X, LEFT_Y, RIGHT_X = 0, 1, 3  #: Axes of the sticks; right and down are positive
 BUTTONS: Mapping[int, str] = {0: "4", 1: " ", 2: "1", 3: "h", 4: "2", 5: "b", 6: "k", 7: "r"}
 """The key that each button stands for: A, B, X, Y, left and right shoulder, back, start."""
 LEGEND = (
@@ -36,15 +34,10 @@ LEGEND = (
 
 @dataclass(frozen=True, slots=True)
 class PadReading:
-    """What a gamepad says.
+    """What a gamepad says."""
 
-    Attributes:
-        axes: of its sticks, -1 to 1.
-        pressed: buttons that have been pressed since the last reading.
-    """
-
-    axes: tuple[float, ...]
-    pressed: tuple[int, ...] = ()
+    axes: tuple[float, ...]  #: of its sticks, -1 to 1
+    pressed: tuple[int, ...] = ()  #: buttons that have been pressed since the last reading
 
     @property
     def keys(self) -> str:
@@ -67,17 +60,12 @@ def _share(axes: tuple[float, ...], axis: int) -> float:
 
 @final
 class Gamepad:
-    """The first gamepad that pygame finds.
-
-    Attributes:
-        name: what it calls itself.
-    """
+    """The first gamepad that pygame finds."""
 
     def __init__(self, pygame: Any) -> None:  # noqa: ANN401 - a module of an extra
-        """Take ``pygame.joystick``'s first."""
         self._pygame, self._stick = pygame, pygame.joystick.Joystick(0)
         self._stick.init()
-        self.name = str(self._stick.get_name())
+        self.name = str(self._stick.get_name())  #: what it calls itself
         self._held: frozenset[int] = frozenset()
 
     def read(self) -> PadReading | None:
@@ -119,14 +107,10 @@ def find_gamepad() -> tuple[Gamepad | None, str]:
     return None, "no gamepad is plugged in: keys only"
 
 
-SPEED_STEP = 0.1
-"""Change of speed [m/s] by one key."""
-TURN_STEP = 0.2
-"""Change of the turning rate [rad/s] by one key."""
-WIDTH = 79
-"""Columns of the state line at most."""
-JOIN_TIME = 5.0
-"""Time [s] that a running call gets to end when the robot is let go."""
+SPEED_STEP = 0.1  #: Change of speed [m/s] by one key
+TURN_STEP = 0.2  #: Change of the turning rate [rad/s] by one key
+WIDTH = 79  #: Columns of the state line at most
+JOIN_TIME = 5.0  #: Time [s] that a running call gets to end when the robot is let go
 
 QUIT, STOP, DAMP = "x", " ", "k"
 STEPS: Mapping[str, tuple[str, VelocityCommand]] = {
@@ -161,7 +145,6 @@ class Teleop:
     """Turns keys into calls on a robot whose time passes by itself (``realtime=True``)."""
 
     def __init__(self, go2: GO2Controller) -> None:
-        """Drive ``go2``."""
         self._go2 = go2
         self._jobs = JobServer(go2)
         self._jobs.start("teleop")
@@ -211,18 +194,14 @@ class Teleop:
         state, command, mode = go2.state, go2.command, go2.mode
         doing = f"{self._doing} ..." if self.is_busy else mode.name.lower()
         if mode in (Mode.FALLEN, Mode.DAMPED) and not self.is_busy:
-            return f"{doing:<13} {self._fault()}"[:WIDTH]
+            outcome = go2.last_outcome
+            reason = "limp" if outcome.ok else outcome.reason
+            return f"{doing:<13} r recovers, 1 stands: {reason}"[:WIDTH]
         asked = (
             f"{command.linear_x:+.1f} {command.linear_y:+.1f} m/s {command.angular_z:+.1f} rad/s"
         )
         measured = f"ahead {state.v[0]:+.2f} m/s, {state.q[2]:.2f} m high"
         return f"{doing:<13} asked {asked}; {measured}"[:WIDTH]
-
-    def _fault(self) -> str:
-        """Why the robot is limp, and what brings it back."""
-        outcome = self._go2.last_outcome
-        reason = "limp" if outcome.ok else outcome.reason
-        return f"r recovers, 1 stands: {reason}"
 
     def news(self) -> list[str]:
         """What has been said since the last call."""

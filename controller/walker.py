@@ -13,23 +13,19 @@ from go2_wbc.planning.envelopes import AUTO, LADDER, GaitChoice, envelope_of
 from go2_wbc.planning.trunk import LEVEL, BodyPose
 from go2_wbc.robot.state import Snapshot
 
-STOP_LIMIT = 4.0
-"""Time [s] in which a walking robot must come to rest after ``stop``."""
+STOP_LIMIT = 4.0  #: Time [s] in which a walking robot must come to rest after ``stop``
 CHANGE_SHARE = 0.65
 """Share of both envelopes in which one gait passes over into another: at their edge it fell."""
 
 
 class Walker:
-    """Lets a robot walk, in one gait after the other.
-
-    Attributes:
-        walking: the behaviour that walks, or will.
-    """
+    """Lets a robot walk, in one gait after the other."""
 
     def __init__(self, runner: Runner, config: Config) -> None:
         """Walk on ``runner``, at first with the trot."""
         self._runner, self._config = runner, config
         self.walking = Walking(runner.loop.model, find_gait("trot"), config.locomotion)
+        """The behaviour that walks, or will."""
         self._envelope = self._envelope_of(self.walking)
 
     def excess(self, command: VelocityCommand) -> tuple[int, str]:
@@ -99,10 +95,7 @@ class Walker:
         return GaitChoice(self._config.envelope) if gait == AUTO else None
 
     def _envelope_of(self, walking: Walking) -> VelocityEnvelope:
-        choice = walking.choice
-        if choice is not None:
-            return choice.envelope
-        return self._widest(walking.gait)
+        return walking.choice.envelope if walking.choice else self._widest(walking.gait)
 
     def _widest(self, gait: Gait) -> VelocityEnvelope:
         return envelope_of(gait, self._config.envelope, self._runner.loop.model.profile)

@@ -25,8 +25,7 @@ from go2_wbc.errors import ConfigError, Go2WbcError
 from go2_wbc.validation import LARGEST, is_finite_number
 
 _Item = TypeVar("_Item", bound=Callable[..., Any])
-_MOST = 2**63
-"""Whole numbers are smaller: those of a file of a sweep, and of NumPy's arrays."""
+_MOST = 2**63  #: Whole numbers are smaller: those of a file of a sweep, and of NumPy's arrays
 _FUNCTION = typing.get_origin(Callable[..., Any])
 _UNIONS = (UnionType, typing.Union)
 

@@ -8,10 +8,8 @@ from importlib.metadata import entry_points
 
 import numpy as np
 
-LONGEST = 200
-"""Characters of a line."""
-MOST_ITEMS = 6
-"""More of them are counted, not listed."""
+LONGEST = 200  #: Characters of a line
+MOST_ITEMS = 6  #: More of them are counted, not listed
 
 
 def brief(self: object) -> str:

@@ -15,8 +15,8 @@ A subroutine called from Python is the Python that it is written in. With ``GO2_
 environment kernels are, too: a debugger steps from the planner into a foothold.
 
 Numba compiles a kernel for this processor when it is first called, or by ``load_kernels``, about
-20 s for all, announced by one line of the log; see ``machine_code``, and ``kept_code``, which keeps
-it between runs. No fast-math flag is set: the bits of a result depend on the inputs only.
+20 s for all, announced by one line of the log; see ``machine_code``, which keeps it between runs.
+No fast-math flag is set: the bits of a result depend on the inputs only.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ MODULES = (
     "go2_wbc.planning.height_map",
     "go2_wbc.planning.locomotion",
     "go2_wbc.planning.rest",
-    "go2_wbc.plant.mujoco.layout",
+    "go2_wbc.plant.mujoco.forces",
     "go2_wbc.reference",
     "go2_wbc.robot.estimator",
     "go2_wbc.robot.latency",
@@ -77,8 +77,7 @@ MODULES = (
     "go2_wbc.wbc.trajectory_loads",
 )
 """Modules that hold kernels."""
-_PROBED = 8
-"""Of so many kernels one is looked for, to see whether many are missing."""
+_PROBED = 8  #: Of so many kernels one is looked for, to see whether many are missing
 
 
 class Routine(Written):
@@ -206,7 +205,7 @@ def load_kernels(*, backwards: bool = False) -> None:
 
 def _helper(kernels: Sequence[Kernel]) -> subprocess.Popen[bytes] | None:
     """A process that compiles the last ones first, where that is worth it."""
-    from go2_wbc.kept_code import KeptCode
+    from go2_wbc.machine_code import KeptCode
 
     if (os.cpu_count() or 1) < 2 or all(KeptCode(made).is_there() for made in kernels[::_PROBED]):
         return None

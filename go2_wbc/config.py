@@ -27,10 +27,10 @@ from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.planning.command import VelocityEnvelope
 from go2_wbc.planning.locomotion import LocomotionConfig
 from go2_wbc.planning.trunk import PoseEnvelope
+from go2_wbc.robot.description import GO2, find_profile, profile_names
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.motor import TORQUE_SPEED, require_motor
 from go2_wbc.robot.payload_estimation import PayloadConfig
-from go2_wbc.robot.profile import GO2, find_profile, profile_names
 from go2_wbc.robot.safety import SafetyConfig
 from go2_wbc.validation import is_finite_number
 from go2_wbc.wbc.config import WbcConfig

@@ -26,17 +26,13 @@ TIE = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class ContactPhase:
-    """The contacts at one instant, or (n, 4) at many.
+    """The contacts at one instant, or (n, 4) at many."""
 
-    Attributes:
-        stance: feet in stance.
-        elapsed: seconds since each foot's last change (inf if it never changed).
-        remaining: seconds until each foot's next change (inf if it never changes).
-    """
-
-    stance: Bool[np.ndarray, "*n 4"]
+    stance: Bool[np.ndarray, "*n 4"]  #: feet in stance
     elapsed: Float[np.ndarray, "*n 4"]
+    """Seconds since each foot's last change (inf if it never changed)."""
     remaining: Float[np.ndarray, "*n 4"]
+    """Seconds until each foot's next change (inf if it never changes)."""
 
     @property
     def progress(self) -> Float[np.ndarray, "*n 4"]:

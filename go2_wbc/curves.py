@@ -65,18 +65,14 @@ class Ease(Enum):
 class Curve:
     """An eased way from each key to the next; comes to rest at each with minimum jerk and cubic.
 
-    Attributes:
-        times: of the keys [s], increasing; those of the curve count from the first one.
-        values: what it passes through, each (n,).
-        ease: of every piece.
-
     Raises:
         CommandError: if there are fewer than two keys, or the times do not increase.
     """
 
     times: Sequence[float]
-    values: Sequence[Float[np.ndarray, " n"]]
-    ease: Ease = Ease.MINIMUM_JERK
+    """Of the keys [s], increasing; those of the curve count from the first one."""
+    values: Sequence[Float[np.ndarray, " n"]]  #: what it passes through, each (n,)
+    ease: Ease = Ease.MINIMUM_JERK  #: of every piece
 
     def __post_init__(self) -> None:
         """Raise CommandError for keys without a way between them."""

@@ -78,8 +78,7 @@ def moving_support_margins(
     return np.where(is_inside, distance, -distance)
 
 
-_TINY = 1e-300
-"""[m^2] Keeps the division by the square of an edge defined for a hull of one point."""
+_TINY = 1e-300  #: [m^2] Keeps the division by the square of an edge defined for a hull of one point
 
 
 def _chain(ordered: Float[np.ndarray, "k 2"]) -> list[Float[np.ndarray, "2"]]:

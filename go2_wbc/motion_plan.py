@@ -22,8 +22,7 @@ class Posture(Enum):
     STAND = "stand"
 
 
-Stance = Posture
-"""The former name of ``Posture``, kept for scripts that use it."""
+Stance = Posture  #: The former name of ``Posture``, kept for scripts that use it
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +52,7 @@ class PlanFeedback:
     """How a solved plan brings the robot back to its state, at one instant.
 
     Attributes:
-        q: (19,) planned configuration, in the motion's frame.
-        v: (18,) planned velocity.
+        q, v: (19,), (18,) planned configuration and velocity, in the motion's frame.
         gains: feedback of the state's error (as Pinocchio's ``difference`` of planned and measured
             q, then of v) into torques: tau - gains @ error [N m].
     """
@@ -87,8 +85,7 @@ class MotionPlan(ABC):
 
     Attributes:
         name: what users call it.
-        entry: stance in which it starts.
-        exit: stance in which it ends.
+        entry, exit: stances in which it starts and ends.
         duration: [s].
     """
 

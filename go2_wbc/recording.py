@@ -19,8 +19,7 @@ from jaxtyping import Bool, Float, Int
 
 from go2_wbc.arguments import typed
 from go2_wbc.brief import cut, inline_html
-from go2_wbc.errors import ConfigError, MissingDependency
-from go2_wbc.extras import EXTRAS, install_line
+from go2_wbc.errors import EXTRAS, ConfigError, MissingDependency, install_line
 from go2_wbc.files import checked_output, write_atomically
 
 if TYPE_CHECKING:
@@ -83,7 +82,6 @@ class Recording:
     _repr_html_ = inline_html
 
     def __repr__(self) -> str:
-        """How long, and what was done."""
         done = " ".join(label for label, _ in groupby(self.labels))
         return cut(f"Recording({len(self.time)} samples, {self.duration:.2f} s: {done})")
 

@@ -39,8 +39,7 @@ T = TypeVar("T")
 
 V3 = tuple[float, float, float]
 """A vector as three numbers, which compiled code keeps in registers."""
-Array3 = Float[np.ndarray, "3"]
-"""A vector in memory; so are the others, by their shapes."""
+Array3 = Float[np.ndarray, "3"]  #: A vector in memory; so are the others, by their shapes
 Array4 = Float[np.ndarray, "4"]
 Array6 = Float[np.ndarray, "6"]
 Array12 = Float[np.ndarray, "12"]
@@ -56,19 +55,12 @@ ArrayNx3x3 = Float[np.ndarray, "n 3 3"]
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """Where a part of a record lies.
+    """Where a part of a record lies."""
 
-    Attributes:
-        start: index of its first number in the row.
-        shape: of its numbers or records; () for a single one.
-        record: class of its records, None for numbers.
-        is_flag: whether its number says yes or no.
-    """
-
-    start: int
-    shape: tuple[int, ...]
-    record: type | None = None
-    is_flag: bool = False
+    start: int  #: index of its first number in the row
+    shape: tuple[int, ...]  #: of its numbers or records; () for a single one
+    record: type | None = None  #: class of its records, None for numbers
+    is_flag: bool = False  #: whether its number says yes or no
 
     @property
     def size(self) -> int:

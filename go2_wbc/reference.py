@@ -25,8 +25,7 @@ from go2_wbc.records import Array4, Array12, Record
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.state import Snapshot
 
-LEAST_WEIGHT, MOST_WEIGHT = 1e-6, 1e2
-"""Of the force regularisation: beyond them accuracy is lost."""
+LEAST_WEIGHT, MOST_WEIGHT = 1e-6, 1e2  #: Of the force regularisation: beyond them accuracy is lost
 _set = object.__setattr__  # of a frozen value that is being made
 
 
@@ -45,21 +44,17 @@ STANCE, SWING, JOINTS = (int(task) for task in LegTask)
 class Target(Record):
     """The numbers of a ``Reference``, one after the other, as kernels read and fill them.
 
-    Attributes:
-        is_com: whether position means the CoM, else the origin of the base.
-        legs: ``LegTask`` of each leg.
-
     All others as in ``Reference`` and its ``BodyTarget``.
     """
 
-    is_com: bool
+    is_com: bool  #: whether position means the CoM, else the origin of the base
     p_world: Float[np.ndarray, "3"]
     v_world: Float[np.ndarray, "3"]
     a_world: Float[np.ndarray, "3"]
     R_world_base: Float[np.ndarray, "3 3"]
     w_world: Float[np.ndarray, "3"]
     dw_world: Float[np.ndarray, "3"]
-    legs: Float[np.ndarray, "4"]
+    legs: Float[np.ndarray, "4"]  #: ``LegTask`` of each leg
     normal_force_min: Float[np.ndarray, "4"]
     normal_force_max: Float[np.ndarray, "4"]
     p_world_feet: Float[np.ndarray, "4 3"]
@@ -143,12 +138,9 @@ class BodyTarget:
 
     Attributes:
         point: whether position means the CoM or the origin of the base.
-        p_world: position [m].
-        v_world: linear velocity [m/s].
-        a_world: linear acceleration [m/s^2].
+        p_world, v_world, a_world: position [m], linear velocity [m/s] and acceleration [m/s^2].
         R_world_base: orientation.
-        w_world: angular velocity [rad/s].
-        dw_world: angular acceleration [rad/s^2].
+        w_world, dw_world: angular velocity [rad/s] and acceleration [rad/s^2].
     """
 
     point: TrackedPoint
@@ -207,7 +199,6 @@ class Reference:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        """Find the feet in stance."""
         stance = np.array([task is LegTask.STANCE for task in self.legs])
         _set(self, "stance", stance)
 

@@ -37,8 +37,7 @@ class Rule:
     holds: Callable[[float], bool]
 
 
-LARGEST = 1e9
-"""No number of a robot of 15 kg is larger, in SI units: more is a slip of the pen."""
+LARGEST = 1e9  #: No number of a robot of 15 kg is larger, in SI units: more is a slip of the pen
 POSITIVE = Rule("positive", lambda value: value > 0.0)
 NOT_NEGATIVE = Rule("at least 0", lambda value: value >= 0.0)
 FINITE = Rule("finite", lambda _: True)
@@ -120,8 +119,10 @@ def retires(**names: object) -> Callable[[_Class], _Class]:
 
         def check(self: object, *given: object) -> None:
             for name, value in zip(order, given, strict=True):
-                if value != table[name].value:
-                    warn_retired(f"{type(self).__name__}.{name}", table[name].instead)
+                if value != table[name].value:  # the caller of the constructor is warned
+                    told = f"{type(self).__name__}.{name} has no effect any more"
+                    message = f"{told}: {table[name].instead}"
+                    warnings.warn(message, FutureWarning, stacklevel=3)
             if further:
                 further(self, *given[: len(own)])
 
@@ -154,9 +155,3 @@ def is_finite_number(value: object) -> TypeGuard[float]:
         return math.isfinite(value)
     except OverflowError:  # an integer beyond every float
         return False
-
-
-def warn_retired(name: str, instead: str) -> None:
-    """Warn the caller of a config's constructor that its argument ``name`` has no effect."""
-    message = f"{name} has no effect any more: {instead}"
-    warnings.warn(message, FutureWarning, stacklevel=4)

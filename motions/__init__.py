@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from motions.plan.compiled_plan import CompiledPlan
     from motions.plan.timeline_compiler import compile_timeline
     from motions.registry import find_motion, load_file, load_motion, motion_names
-    from motions.saved.motion_file import save_motion
-    from motions.saved.plan_file import load_plan, save_plan
+    from motions.saved.files import load_plan, save_motion, save_plan
 
 __all__ = [
     "Beats",

@@ -59,7 +59,6 @@ class Range:
     unit: str = ""
 
     def __str__(self) -> str:
-        """For a person."""
         return f"{self.low:g} to {self.high:g} {self.unit}".strip()
 
 
@@ -71,11 +70,9 @@ class Choice:
 
     @typed(error=TimelineError)
     def __init__(self, *words: str) -> None:
-        """The valid ``words``."""
         object.__setattr__(self, "words", words)
 
     def __str__(self) -> str:
-        """For a person."""
         return " or ".join(self.words)
 
 
@@ -104,7 +101,6 @@ class Parameter:
         return type(self.default)(value)
 
     def __str__(self) -> str:
-        """For a person."""
         shown = f"{self.default:g}" if isinstance(self.default, float) else str(self.default)
         return f"{self.name}={shown} ({self.valid})"
 
@@ -114,8 +110,7 @@ class Motion:
     """A motion that can be made with other parameters.
 
     Attributes:
-        name: what users call it.
-        summary: first line of its docstring.
+        name, summary: what users call it, and the first line of its docstring.
         parameters: what can be chosen.
         source: file and line where it is written.
     """
@@ -127,7 +122,6 @@ class Motion:
     _make: Callable[..., Timeline]
 
     def __repr__(self) -> str:
-        """Its name and parameters."""
         return cut(f"Motion({', '.join([repr(self.name), *map(str, self.parameters)])})")
 
     def __reduce__(self) -> tuple[Callable[..., Motion], tuple[str, str]]:

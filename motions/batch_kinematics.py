@@ -29,40 +29,26 @@ LEAST_WEIGHT = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Wanted:
-    """What is asked of trunk and legs at every instant.
+    """What is asked of trunk and legs at every instant."""
 
-    Attributes:
-        p: (n, 3) place [m] of the CoM, or of the base.
-        is_com: (n,) of which.
-        R: (n, 3, 3) attitude of the trunk.
-        q_joints: (n, 12) angles [rad] of the raised legs; those of the others do not count.
-        raised: (n, 4) legs that follow their joints; the others, their feet.
-        p_feet: (n, 4, 3) where the feet of the other legs are [m].
-    """
-
-    p: Float[np.ndarray, "n 3"]
-    is_com: Bool[np.ndarray, " n"]
-    R: Float[np.ndarray, "n 3 3"]
+    p: Float[np.ndarray, "n 3"]  #: (n, 3) place [m] of the CoM, or of the base
+    is_com: Bool[np.ndarray, " n"]  #: (n,) of which
+    R: Float[np.ndarray, "n 3 3"]  #: (n, 3, 3) attitude of the trunk
     q_joints: Float[np.ndarray, "n 12"]
-    raised: Bool[np.ndarray, "n 4"]
-    p_feet: Float[np.ndarray, "n 4 3"]
+    """(n, 12) angles [rad] of the raised legs; those of the others do not count."""
+    raised: Bool[np.ndarray, "n 4"]  #: (n, 4) legs that follow their joints; the others, their feet
+    p_feet: Float[np.ndarray, "n 4 3"]  #: (n, 4, 3) where the feet of the other legs are [m]
 
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """What comes of it.
+    """What comes of it."""
 
-    Attributes:
-        p_base: (n, 3) origin of the base [m].
-        q_joints: (n, 12) joint angles [rad].
-        p_com: (n, 3) CoM [m].
-        miss: (n, 4) distance [m] by which such a foot is out of its leg's reach.
-    """
-
-    p_base: Float[np.ndarray, "n 3"]
-    q_joints: Float[np.ndarray, "n 12"]
-    p_com: Float[np.ndarray, "n 3"]
+    p_base: Float[np.ndarray, "n 3"]  #: (n, 3) origin of the base [m]
+    q_joints: Float[np.ndarray, "n 12"]  #: (n, 12) joint angles [rad]
+    p_com: Float[np.ndarray, "n 3"]  #: (n, 3) CoM [m]
     miss: Float[np.ndarray, "n 4"]
+    """(n, 4) distance [m] by which such a foot is out of its leg's reach."""
 
 
 def place(wanted: Wanted, steps: int, model: RobotModel) -> Placed:

@@ -12,8 +12,8 @@ from jaxtyping import Float
 from go2_wbc.curves import Curve
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.reference import Anchor, Reference, Target, TrackedPoint
+from go2_wbc.robot.description import RobotProfile, find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import RobotProfile, find_profile
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.tracking.plan_curves import stand
 from motions.batch_kinematics import Wanted, attitudes, place
@@ -24,10 +24,8 @@ NORMAL_FORCE_MAX = 400.0
 """Greatest normal force [N]: 2.5 times the robot's weight, never active in slow motions."""
 LEAST_REACH = 0.03
 """Least reach [m] of a sitting robot's rear legs in their planes; 0.05 on feet below the hips."""
-MOST_RAISED = 0.012
-"""Most that narrow feet raise a sit [m], inside of ``checks.HEIGHT_TOLERANCE``."""
-SETTLING_STEPS = 10
-"""Steps that put the CoM of a standing robot in its place; see ``place``."""
+MOST_RAISED = 0.012  #: Most that narrow feet raise a sit [m], inside of ``checks.HEIGHT_TOLERANCE``
+SETTLING_STEPS = 10  #: Steps that put the CoM of a standing robot in its place; see ``place``
 
 
 def __getattr__(name: str) -> Float[np.ndarray, "6"]:
@@ -88,19 +86,13 @@ _HOMES: WeakKeyDictionary[RobotModel, Mapping[Posture, np.ndarray]] = WeakKeyDic
 
 @dataclass(frozen=True, slots=True)
 class PosturePlan(MotionPlan):
-    """The trunk goes from one pose to another by minimum jerk.
+    """The trunk goes from one pose to another by minimum jerk."""
 
-    Attributes:
-        name, entry, exit: see ``MotionPlan``.
-        point: which point the first three components of ``body`` move.
-        body: from x, y, z [m] and roll, pitch, yaw [rad] (6,) to others.
-    """
-
-    name: str
+    name: str  #: see ``MotionPlan``, as for the next two
     entry: Posture
     exit: Posture
-    point: TrackedPoint
-    body: Curve
+    point: TrackedPoint  #: which point the first three components of ``body`` move
+    body: Curve  #: from x, y, z [m] and roll, pitch, yaw [rad] (6,) to others
 
     @property
     def duration(self) -> float:  # type: ignore[override]

@@ -23,8 +23,7 @@ import pytest
 if TYPE_CHECKING:
     from motions import FeasibilityChecker, FeasibilityReport, Motion, Timeline
 
-_SIGNS = ("@motion", "import")
-"""What a file with motions contains."""
+_SIGNS = ("@motion", "import")  #: What a file with motions contains
 PINOCCHIO_WARNING = "ignore:Please update your 'hppfcl' imports:DeprecationWarning:hppfcl"
 """Pinocchio 3.8 imports its collision library under that library's former name."""
 

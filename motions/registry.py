@@ -14,7 +14,7 @@ from go2_wbc.arguments import typed
 from go2_wbc.errors import CommandError, TimelineError, unknown_name
 from motions.authoring import Motion, Value, last_line
 from motions.language.timeline import Timeline
-from motions.saved.motion_file import MOTION_FORMAT, read_motion
+from motions.saved.files import MOTION_FORMAT, read_motion
 
 LIBRARY = Path(__file__).with_name("library")
 """The folder of the library, whose files are as users write theirs."""

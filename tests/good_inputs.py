@@ -102,7 +102,7 @@ THINGS: dict[str, Callable[[], object]] = {
     "Motion": _of("motion"),
     "World": lambda: importlib.import_module("go2_wbc").World(),
     "Reference": _of("reference"),
-    "SeenTerrain": lambda: importlib.import_module("controller.seen_terrain").SeenTerrain(
+    "SeenTerrain": lambda: importlib.import_module("controller.telemetry").SeenTerrain(
         importlib.import_module("go2_wbc.planning.height_map").HeightMap(), ""
     ),
 }

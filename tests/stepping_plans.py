@@ -8,8 +8,8 @@ from scipy.interpolate import CubicHermiteSpline, PPoly
 from go2_wbc.contacts import ContactSchedule
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.motion_plan import Posture
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import find_profile
 from motions.plan.compiled_plan import CompiledPlan
 from motions.postures import standing_feet
 from tests.engine_helpers import STAND_JOINTS

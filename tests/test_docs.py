@@ -17,7 +17,7 @@ from go2_wbc.config import Config, load_config
 from go2_wbc.curves import Ease
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.motion_plan import Posture
-from go2_wbc.robot.profile import find_profile
+from go2_wbc.robot.description import find_profile
 from go2_wbc.wbc.config import Gains
 from go2_wbc.world import World
 from motions import FeasibilityChecker, Timeline, check, compile_timeline, load_motion

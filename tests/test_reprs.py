@@ -10,7 +10,7 @@ import pytest
 import go2_wbc
 import motions
 from controller import GO2Controller
-from controller.seen_terrain import SeenTerrain
+from controller.telemetry import SeenTerrain
 from go2_wbc.brief import LONGEST
 from go2_wbc.planning.height_map import HeightMap
 from go2_wbc.plant.mujoco.lidar import LidarConfig

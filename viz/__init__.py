@@ -8,11 +8,15 @@ from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from viz.content import Annotation, MarginCurve, ReplayContent, Verdict
-    from viz.render.animation import ANIMATION_SUFFIXES, export_animation
-    from viz.render.margin_plot import export_plot, margin_figure
-    from viz.render.still import export_filmstrip
-    from viz.render.study_plots import Relation, export_distributions, export_relations
-    from viz.replay.html_page import HTML_SUFFIXES, export_html
+    from viz.render.pictures import ANIMATION_SUFFIXES, export_animation, export_filmstrip
+    from viz.render.plots import (
+        Relation,
+        export_distributions,
+        export_plot,
+        export_relations,
+        margin_figure,
+    )
+    from viz.replay.page_data import HTML_SUFFIXES, export_html
     from viz.style import PLOT_SUFFIXES
 
 __all__ = [

@@ -16,8 +16,7 @@ from go2_wbc.brief import brief
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
 
-CENTRE_OF_MASS = "com"
-"""Stands in ``Annotation.parts`` for the centre of mass."""
+CENTRE_OF_MASS = "com"  #: Stands in ``Annotation.parts`` for the centre of mass
 _LEAST_SAMPLES = 2
 
 
@@ -64,9 +63,7 @@ class Annotation:
     """A limit that one subject breaks, or nearly does.
 
     Attributes:
-        limit: its name.
-        subject: joint, foot or part of the body.
-        time: when [s] it is worst.
+        limit, subject, time: its name; joint, foot or part of the body; when [s] it is worst.
         text: value and limit in words.
         is_broken: otherwise the margin is only tight.
         spans: start and end [s] of each stretch in which it is so.
@@ -84,44 +81,26 @@ class Annotation:
 
 @dataclass(frozen=True, slots=True)
 class CertifiedRun:
-    """One randomised run.
+    """One randomised run."""
 
-    Attributes:
-        seed: that it can be repeated with.
-        conditions: what the seed has drawn, in words.
-        is_done: whether the movement was done.
-        text: what went wrong, or came nearest to it.
-    """
-
-    seed: int
-    conditions: str
-    is_done: bool
-    text: str
+    seed: int  #: that it can be repeated with
+    conditions: str  #: what the seed has drawn, in words
+    is_done: bool  #: whether the movement was done
+    text: str  #: what went wrong, or came nearest to it
 
 
 @dataclass(frozen=True, slots=True)
 class CertifiedRate:
-    """How often a movement was done in randomised runs.
+    """How often a movement was done in randomised runs."""
 
-    Attributes:
-        n: runs.
-        done: runs in which it was done.
-        interval: of the true rate, 0 to 1.
-        confidence: of the interval, 0 to 1.
-        world: in which it holds, in words.
-        worst: the worst runs, the worst first.
-        versions: what else it holds for, by name.
-        outdated: why it does not hold for what is shown; empty if it does.
-    """
-
-    n: int
-    done: int
-    interval: tuple[float, float]
-    confidence: float
-    world: str
-    worst: tuple[CertifiedRun, ...]
-    versions: Mapping[str, str]
-    outdated: str = ""
+    n: int  #: runs
+    done: int  #: those in which it was done
+    interval: tuple[float, float]  #: of the true rate, 0 to 1
+    confidence: float  #: of the interval, 0 to 1
+    world: str  #: in which it holds, in words
+    worst: tuple[CertifiedRun, ...]  #: the worst runs, the worst first
+    versions: Mapping[str, str]  #: what else it holds for, by name
+    outdated: str = ""  #: why it does not hold for what is shown; empty if it does
 
 
 @typed()
@@ -157,24 +136,15 @@ class Verdict:
 @typed()
 @dataclass(frozen=True, slots=True)
 class Slider:
-    """A parameter that can be chosen on a live page.
+    """A parameter that can be chosen on a live page."""
 
-    Attributes:
-        name: of the parameter.
-        value: what is chosen now: a number, or one of ``words``.
-        low, high: what is valid.
-        is_whole: only whole numbers are.
-        unit: of the number.
-        words: what is valid instead of a number.
-    """
-
-    name: str
-    value: float | str
-    low: float = 0.0
-    high: float = 1.0
-    is_whole: bool = False
-    unit: str = ""
-    words: tuple[str, ...] = ()
+    name: str  #: of the parameter
+    value: float | str  #: what is chosen now: a number, or one of ``words``
+    low: float = 0.0  #: what is valid, at the least
+    high: float = 1.0  #: at the most
+    is_whole: bool = False  #: only whole numbers are
+    unit: str = ""  #: of the number
+    words: tuple[str, ...] = ()  #: what is valid instead of a number
 
 
 @typed()

@@ -1,9 +1,16 @@
-"""Behaviours: each turns the snapshot of a tick into what to track now."""
+"""Behaviours: each turns the snapshot of a tick into what to track now.
+
+Here those that need no contact model: going limp, and moving the joints by a servo.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.curves import Curve
 from go2_wbc.reference import JointReference, Reference
 from go2_wbc.robot.state import Snapshot
 
@@ -43,3 +50,78 @@ class Behaviour(ABC):
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether it has nothing more to do; it goes on holding its end until replaced."""
         return snapshot.state.time - self._start >= self.duration
+
+
+DAMPING = 3.0  #: Joint damping [N m s/rad] of the safe state: the robot sinks in about a second
+SERVO_DAMPING = 2.0  #: That of a servo [N m s/rad]
+
+
+class _OnTheGround(Behaviour):
+    """Something that a robot does on the ground, where only a large tilt can be a fall."""
+
+    may_lie = True
+
+    def __init__(self, label: str, *, stays_on_belly: bool) -> None:
+        self.label, self.needs_balance = label, stays_on_belly
+
+
+class Damped(_OnTheGround):
+    """Limp: no stiffness, only damping."""
+
+    def __init__(
+        self, label: str = "damped", duration: float = 0.0, *, stays_on_belly: bool = False
+    ) -> None:
+        """Go limp.
+
+        Args:
+            label: see ``Behaviour``.
+            duration: time [s] before it counts as finished.
+            stays_on_belly: whether a robot that is tipped over, or was before, has fallen.
+        """
+        super().__init__(label, stays_on_belly=stays_on_belly)
+        self.duration = duration
+
+    def start(self, snapshot: Snapshot) -> None:
+        """Note the time and the joints."""
+        super().start(snapshot)
+        self._joints = snapshot.state.joint_positions.copy()
+
+    def update(self, snapshot: Snapshot) -> JointReference:
+        """Zero stiffness."""
+        return JointReference(self._joints, np.zeros(12), 0.0, DAMPING)
+
+
+class ServoJoints(_OnTheGround):
+    """Move the joints through keyframes by a stiff servo; for when the trunk lies on the ground."""
+
+    def __init__(
+        self,
+        label: str,
+        targets: tuple[tuple[float, Float[np.ndarray, "12"]], ...],
+        kp: float = 40.0,
+        *,
+        stays_on_belly: bool = False,
+    ) -> None:
+        """Move.
+
+        Args:
+            label: see ``Behaviour``.
+            targets: (duration [s], joint angles (12,) [rad]) of each leg of the way.
+            kp: stiffness [N m/rad].
+            stays_on_belly: whether a robot that is tipped over, or was before, has fallen.
+        """
+        super().__init__(label, stays_on_belly=stays_on_belly)
+        self._targets, self._kp = targets, kp
+
+    def start(self, snapshot: Snapshot) -> None:
+        """Plan from the measured joints."""
+        super().start(snapshot)
+        times = np.cumsum([0.0, *(duration for duration, _ in self._targets)]).tolist()
+        values = [snapshot.state.joint_positions.copy(), *(q for _, q in self._targets)]
+        self._curve = Curve(times, values)
+        self.duration = self._curve.duration
+
+    def update(self, snapshot: Snapshot) -> JointReference:
+        """The point of the way that belongs to this instant."""
+        point = self._curve.at(snapshot.state.time - self._start)
+        return JointReference(point.value, point.rate, self._kp, SERVO_DAMPING)

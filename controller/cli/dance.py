@@ -6,9 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from controller.cli.common import ExitCode, Html, Json, print_json, shown_path, whole
+from controller.cli.common import ExitCode, Html, Json, ProgressLine, print_json, shown_path, whole
 from controller.cli.motion_run import getting_ready
-from controller.cli.progress import ProgressLine
 
 if TYPE_CHECKING:
     from motions import CheckedMotion, FeasibilityChecker

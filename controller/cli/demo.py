@@ -20,19 +20,18 @@ from controller.cli.common import (
     ExitCode,
     Mjcf,
     Numbers,
+    ProgressLine,
     folder,
     print_json,
     reader,
     shown_path,
     whole,
 )
-from controller.cli.progress import ProgressLine
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.files import checked_output, write_atomically
 
 if TYPE_CHECKING:
-    from controller.demo.run import DemoProgress
-    from controller.demo.steps import DemoReport, DemoTotals, Measurement, StepResult
+    from controller.demo.steps import DemoProgress, DemoReport, DemoTotals, Measurement, StepResult
     from controller.go2_controller import GO2Controller
     from go2_wbc.recording import Recording
 
@@ -133,7 +132,8 @@ def run(
     else:
         print(render(report, sys.stdout.encoding), end="\n\n", flush=True)
     try:
-        _write_data(recording, values, paths)
+        recording.save(paths[0])
+        write_atomically(paths[1], (json.dumps(values, indent=2) + "\n").encode())
         if not output.no_media:
             title = TITLE if robot.terrain is None else SEEING.format(robot.terrain)
             _write_media(recording, report, paths, title)
@@ -150,7 +150,7 @@ def run(
 def _run_over_ros(namespace: str, *, as_json: bool) -> int:
     """Run the demo on a robot that another process serves, print the steps."""
     from controller.bridges.ros2.demo import run_ros_demo
-    from controller.cli.progress import ProgressLine
+    from controller.cli.common import ProgressLine
     from controller.demo.steps import DEMO_STEPS, DemoReport
 
     number = count(1)
@@ -182,8 +182,7 @@ def checked_paths(folder: Path) -> list[Path]:
 
 
 def _perform(output: Output, robot: Robot, control: Control) -> tuple[DemoReport, Recording]:
-    from controller.demo.run import run_demo
-    from controller.demo.steps import DEMO_STEPS, TERRAINS, terrain_steps
+    from controller.demo.steps import DEMO_STEPS, TERRAINS, run_demo, terrain_steps
 
     steps = DEMO_STEPS if robot.terrain is None else terrain_steps(TERRAINS[robot.terrain])
     with ProgressLine() as line:
@@ -240,12 +239,6 @@ def _has_display() -> bool:
     return problem is None
 
 
-def _write_data(recording: Recording, values: Mapping[str, object], paths: list[Path]) -> None:
-    """The recording and the report."""
-    recording.save(paths[0])
-    write_atomically(paths[1], (json.dumps(values, indent=2) + "\n").encode())
-
-
 def _write_media(recording: Recording, report: DemoReport, paths: list[Path], title: str) -> None:
     """Page, filmstrip and animation; the animation takes by far the longest."""
     _, _, page, filmstrip, animation = paths
@@ -296,8 +289,7 @@ def _longest_mode(recording: Recording, rows: Int[np.ndarray, " k"], feet: int) 
 WIDTH = 80
 _HEADER = f"     {'step':<21}{'time':>7}  {'figure':<23}{'asked':>9}{'measured':>9}"
 _INDENT = " " * 5
-_DECIMALS = {"deg": 1}
-"""Decimals of a unit's numbers; 3 for any other."""
+_DECIMALS = {"deg": 1}  #: Decimals of a unit's numbers; 3 for any other
 
 
 def render(report: DemoReport, encoding: str | None = None) -> str:

@@ -31,9 +31,8 @@ from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
 from controller.cli.common import PROGRAM, ExitCode, installed_version, print_json
-from go2_wbc.errors import DescriptionError
-from go2_wbc.extras import EXTRAS
-from go2_wbc.extras import install_line as extra_line
+from go2_wbc.errors import EXTRAS, DescriptionError
+from go2_wbc.errors import install_line as extra_line
 
 WIDTH = 80
 OLDEST_PYTHON, NEWEST_PYTHON = (3, 11), (3, 13)
@@ -95,17 +94,11 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class ImportProbe:
-    """How the import of a module went.
+    """How the import of a module went."""
 
-    Attributes:
-        error: why it failed, in one line; empty if it worked.
-        file: the file that was imported.
-        solvers: the QP solvers that the module offers, if it is ``qpsolvers``.
-    """
-
-    error: str = ""
-    file: str = ""
-    solvers: tuple[str, ...] = ()
+    error: str = ""  #: why it failed, in one line; empty if it worked
+    file: str = ""  #: the file that was imported
+    solvers: tuple[str, ...] = ()  #: the QP solvers that the module offers, if it is ``qpsolvers``
 
 
 def run(*, json: Annotated[bool, "print JSON for a program to read"] = False) -> int:

@@ -16,44 +16,28 @@ import sys
 import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 from controller.cli.common import (
     PROGRAM,
+    TRIES,
     ExitCode,
     Subparsers,
     add_command,
     examples_epilog,
     installed_version,
 )
-from controller.cli.progress import TRIES
 from controller.pacing import REASON
-from go2_wbc.errors import (
-    CommandError,
-    ConfigError,
-    Go2WbcError,
-    IkError,
-    ModelMismatch,
-    MotionError,
-    MotionFileError,
-    QpInfeasible,
-    SolverUnavailable,
-    TimelineError,
-)
+from go2_wbc import errors
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A subcommand.
+    """A subcommand."""
 
-    Attributes:
-        name: what is typed.
-        place: ``MODULE:FUNCTION`` of what it runs; the function is ``run`` if none is named.
-        summary: its line in the list.
-    """
-
-    name: str
-    place: str
-    summary: str
+    name: str  #: what is typed
+    place: str  #: ``MODULE:FUNCTION`` of what it runs; the function is ``run`` if none is named
+    summary: str  #: its line in the list
 
     def add_to(self, subparsers: Subparsers) -> None:
         """Import it, and add its parser."""
@@ -67,12 +51,12 @@ COMMANDS = tuple(
     for name, place, summary in (
         ("certify", "sweep:certify_command", "how often a motion is done in random worlds"),
         ("check", "motions:check", "can the robot do this motion?"),
-        ("completion", "completion", "what a shell needs to complete this on TAB"),
+        ("completion", "main:completion", "what a shell needs to complete this on TAB"),
         ("dance", "dance", "a dance on the beats of a song"),
         ("demo", "demo", "stand, sit, walk, turn, high five; measured, in 3D"),
         ("doctor", "doctor", "check this installation, say what is missing"),
         ("export", "motions:export", "a motion's trajectory as NumPy or CSV"),
-        ("identify-friction", "identify_friction", "measure the joints' friction"),
+        ("identify-friction", "bridges:friction", "measure the joints' friction"),
         ("list", "motions:list_motions", "the motions, and what can be set"),
         ("new", "motions:new", "write a small motion to start from"),
         ("preview", "motion_preview", "watch a motion, live in the browser"),
@@ -96,11 +80,14 @@ go2-wbc doctor --json    the same for a program to read
 go2-wbc COMMAND --help   the options of a command, with examples
 """
 
-EXIT_CODES: tuple[tuple[tuple[type[Go2WbcError], ...], ExitCode], ...] = (
-    ((CommandError, ConfigError, SolverUnavailable, ModelMismatch), ExitCode.USAGE),
-    ((TimelineError, MotionFileError), ExitCode.USAGE),
-    ((MotionError, QpInfeasible, IkError), ExitCode.FAILED),
-    ((Go2WbcError,), ExitCode.RUNTIME),
+EXIT_CODES: tuple[tuple[tuple[type[errors.Go2WbcError], ...], ExitCode], ...] = (
+    (
+        (errors.CommandError, errors.ConfigError, errors.SolverUnavailable, errors.ModelMismatch),
+        ExitCode.USAGE,
+    ),
+    ((errors.TimelineError, errors.MotionFileError), ExitCode.USAGE),
+    ((errors.MotionError, errors.QpInfeasible, errors.IkError), ExitCode.FAILED),
+    ((errors.Go2WbcError,), ExitCode.RUNTIME),
 )
 """The exit code of an error, of every command; the first row that fits counts."""
 
@@ -220,7 +207,7 @@ def _explained(error: BaseException) -> tuple[str, ExitCode]:
     """What to say of an error, and the exit code; a bug shows its traceback first."""
     if isinstance(error, KeyboardInterrupt):
         return "interrupted", ExitCode.INTERRUPTED
-    if isinstance(error, Go2WbcError):
+    if isinstance(error, errors.Go2WbcError):
         return str(error), next(code for kinds, code in EXIT_CODES if isinstance(error, kinds))
     if isinstance(error, ImportError) and (error.name or "").split(".")[0] not in _OURS:
         hint = f"`{PROGRAM} doctor` says what is missing and how to get it"
@@ -229,6 +216,37 @@ def _explained(error: BaseException) -> tuple[str, ExitCode]:
         return f"{error.filename}: {error.strerror}", ExitCode.RUNTIME
     traceback.print_exception(error)
     return "this is a bug in the program; the lines above say where", ExitCode.RUNTIME
+
+
+SHELLS = ("bash", "zsh", "fish", "tcsh")
+_MOTIONS = "_go2_wbc_motions"
+
+
+def completion(shell: Annotated[str, SHELLS, "which one"]) -> int:
+    """Print the script with which a shell completes `go2-wbc` on TAB.
+
+    Examples:
+        go2-wbc completion bash > ~/.local/share/bash-completion/completions/go2-wbc
+        eval "$(go2-wbc completion bash)"    in this shell only
+        go2-wbc completion zsh > ~/.zfunc/_go2-wbc
+        go2-wbc completion fish > ~/.config/fish/completions/go2-wbc.fish
+    """
+    import shtab
+
+    from motions import motion_names
+
+    parser = build_parser(Program(PROGRAM, "", COMMANDS, ""), None, is_whole=True)
+    completed = {"FILE": shtab.FILE, "FILE.py": shtab.FILE, "DIR": shtab.DIRECTORY}
+    completed["MOTION"] = {**shtab.FILE, "bash": _MOTIONS}
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for option in (option for sub in action.choices.values() for option in sub._actions):
+                if option.metavar in completed:
+                    setattr(option, "complete", completed[option.metavar])  # noqa: B010 - shtab's
+    words = " ".join(motion_names())
+    preamble = f'{_MOTIONS}() {{ compgen -W "{words}" -- $1; compgen -f -- $1; }}'
+    print(shtab.complete(parser, shell, preamble=preamble if shell == "bash" else ""))
+    return ExitCode.OK
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from go2_wbc.brief import counted
 from go2_wbc.errors import CommandError, unknown_name
 
 if TYPE_CHECKING:
-    from controller.cli.progress import ProgressLine
+    from controller.cli.common import ProgressLine
     from go2_wbc.config import Config
     from go2_wbc.world import World
     from motions import CompiledPlan, FeasibilityChecker, FeasibilityReport, Motion, Timeline

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import viz
 from controller.cli.common import (
     ExitCode,
+    ProgressLine,
     page_file,
     plot_file,
     print_json,
@@ -27,7 +28,6 @@ from controller.cli.motion_args import (
     print_verdict,
     the_motion,
 )
-from controller.cli.progress import ProgressLine
 from go2_wbc.errors import Go2WbcError
 
 if TYPE_CHECKING:
@@ -35,10 +35,8 @@ if TYPE_CHECKING:
     from viz.content import ReplayContent
     from viz.replay.preview_server import PreviewServer
 
-POLL_PERIOD = 0.05
-"""Time [s] between two looks at the file."""
-VIDEO_RATE = 12.5
-"""Pictures per second: 80 ms each, which GIF can store."""
+POLL_PERIOD = 0.05  #: Time [s] between two looks at the file
+VIDEO_RATE = 12.5  #: Pictures per second: 80 ms each, which GIF can store
 
 
 _port = reader(int, lambda value: 0 <= value <= 65535, "a port from 0 to 65535")

@@ -16,6 +16,7 @@ from controller.cli.common import (
     Json,
     Mjcf,
     Numbers,
+    ProgressLine,
     output,
     print_json,
     shown_path,
@@ -32,7 +33,6 @@ from controller.cli.motion_args import (
     the_motion,
 )
 from controller.cli.motion_preview import VIDEO_RATE
-from controller.cli.progress import ProgressLine
 from controller.modes import Mode
 from go2_wbc.errors import ConfigError, PlantError, StanceMismatch
 
@@ -48,10 +48,8 @@ if TYPE_CHECKING:
     from go2_wbc.world import World
     from motions import CheckedMotion
 
-TELL_EVERY = 50
-"""Ticks between two looks at the progress line."""
-GETTING_READY = 2.5
-"""About how long [s] the robot takes to stand up before the motion."""
+TELL_EVERY = 50  #: Ticks between two looks at the progress line
+GETTING_READY = 2.5  #: About how long [s] the robot takes to stand up before the motion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,7 +13,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from controller.cli.common import ExitCode, Json, Numbers, folder, output, print_json, shown_path
+from controller.cli.common import (
+    ExitCode,
+    Json,
+    Numbers,
+    ProgressLine,
+    folder,
+    output,
+    print_json,
+    shown_path,
+)
 from controller.cli.motion_args import (
     MOTION_HELP,
     SAVED_MOTION,
@@ -27,7 +36,6 @@ from controller.cli.motion_args import (
     print_verdict,
     the_motion,
 )
-from controller.cli.progress import ProgressLine
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.legs import JOINT_NAMES, LEGS
@@ -37,8 +45,7 @@ if TYPE_CHECKING:
     from motions.plan.trajectory import Trajectory
 
 WIDTH = 80
-ARRAYS = ("q", "v", "a", "rpy", "p_com", "stance")
-"""What an npz file holds beside the time."""
+ARRAYS = ("q", "v", "a", "rpy", "p_com", "stance")  #: What an npz file holds beside the time
 STARTER = '''"""{title}: a motion for the Go2.
 
     go2-wbc check {name}.py      can the robot do it?
@@ -139,7 +146,7 @@ def new(
 
 def _scene() -> str:
     """MJCF in which the robot may stand on the floor and on the ramp."""
-    from go2_wbc.plant.mujoco.scene import RAMP_MIDDLE, RAMP_PITCH, starter_scene
+    from go2_wbc.plant.mujoco.user_model import RAMP_MIDDLE, RAMP_PITCH, starter_scene
     from go2_wbc.robot.model import RobotModel
     from go2_wbc.robot.rotations import quaternion_from_rpy, rotation_from_rpy
     from motions.postures import standing_feet, standing_on

@@ -7,9 +7,16 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from controller.cli.common import ExitCode, Html, Json, plot_file, print_json, shown_path
+from controller.cli.common import (
+    ExitCode,
+    Html,
+    Json,
+    ProgressLine,
+    plot_file,
+    print_json,
+    shown_path,
+)
 from controller.cli.motion_args import Friction, MotionWord, Payload, Settings, the_motion
-from controller.cli.progress import ProgressLine
 from go2_wbc.errors import CommandError
 
 if TYPE_CHECKING:
@@ -19,8 +26,7 @@ if TYPE_CHECKING:
     from go2_wbc.world import World
     from motions import CompiledPlan, Timeline
 
-LINES = 20
-"""How often progress is told where no line can be rewritten."""
+LINES = 20  #: How often progress is told where no line can be rewritten
 WHAT = """a motion: name of the library, FILE.py[:NAME], FILE.json, FILE.plan;
 gait:NAME[@VX[,VY[,WZ]]]; push:IMPULSE[@SPEED] (N s, m/s); or a
 function (seed) -> row: FILE.py:NAME, MODULE:NAME"""
@@ -64,8 +70,7 @@ def sweep_command(
         go2-wbc sweep my_study.py:trial --n 1000 --out study.sqlite
         go2-wbc sweep my_study.py:trial --n 9000 --engine ray --address auto
     """
-    from controller.sweeps.export import export_rows, require_exporter
-    from controller.sweeps.run import sweep
+    from controller.sweeps.run import export_rows, require_exporter, sweep
     from controller.sweeps.summary import summarise
     from controller.sweeps.targets import motion_target
 

@@ -17,8 +17,7 @@ from go2_wbc.world import SENSORS
 if TYPE_CHECKING:
     from controller.teleop import Gamepad, Teleop
 
-REFRESH = 0.1
-"""Time [s] between two looks at the keyboard and the robot."""
+REFRESH = 0.1  #: Time [s] between two looks at the keyboard and the robot
 _CLEAR_LINE = "\r\x1b[2K"
 
 

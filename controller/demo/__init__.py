@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING
 from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from controller.demo.run import DemoProgress, run_demo
     from controller.demo.steps import (
         DEMO_STEPS,
+        DemoProgress,
         DemoReport,
         DemoStep,
         DemoTotals,
         Measurement,
         StepResult,
+        run_demo,
     )
 
 __all__ = [

@@ -1,8 +1,12 @@
-"""The steps of the demo as data: what is done, what is measured of it, and the report of all."""
+"""The demo as data: what is done, what is measured of it, and the report; and what runs it.
+
+No files, no printing.
+"""
 
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
@@ -10,11 +14,12 @@ import numpy as np
 from jaxtyping import Float
 
 from controller.go2_controller import GO2Controller
-from controller.modes import ANGLE_TOLERANCE, HEIGHT_TOLERANCE, STILL_SPEED, Outcome
+from controller.modes import ANGLE_TOLERANCE, HEIGHT_TOLERANCE, STILL_SPEED, Mode, Outcome
 from controller.navigation import HEADING_TOLERANCE
+from go2_wbc.errors import ClosedError, Go2WbcError, PlantError
 from go2_wbc.plant.terrain import BOTH, Blocks, Course, Gap, Stairs, Stones, Terrain
 from go2_wbc.recording import Recording
-from go2_wbc.robot.profile import find_profile
+from go2_wbc.robot.description import find_profile
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +48,6 @@ class Measurement:
         return abs(self.measured - self.asked) <= self.tolerance  # False for nan
 
     def __str__(self) -> str:
-        """One line for a person."""
         text = f"{self.name} {self.measured:.3g} {self.unit}"
         if self.asked is None:
             return text
@@ -56,12 +60,9 @@ class StepResult:
     """What came of one step.
 
     Attributes:
-        name: identifies the step.
-        label: says what was to be done.
-        ok: whether the measurements show that it was done.
-        reason: why, in plain words.
-        start: plant time [s] at which it began.
-        duration: robot time [s] that it took.
+        name, label: identify the step, and say what was to be done.
+        ok, reason: whether the measurements show that it was done; why, in plain words.
+        start, duration: plant time [s] at which it began, and robot time [s] that it took.
         figures: what was measured.
     """
 
@@ -142,36 +143,24 @@ def _without_nan(value: object) -> object:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-FORWARD_SPEED = 0.2
-"""Speed [m/s] of the walk."""
-FORWARD_TIME = 2.0
-"""Duration [s] of the walk."""
+FORWARD_SPEED = 0.2  #: Speed [m/s] of the walk
+FORWARD_TIME = 2.0  #: Duration [s] of the walk
 SPEED_UP_TIME = 0.5
 """Time [s] at the start of the walk that does not count for its mean speed; the ramp takes 0.13 s
 and the first stride 0.36 s."""
-SPEED_TOLERANCE = 0.02
-"""Accepted error [m/s] of the mean speed: a tenth of what is asked."""
-STOP_TIME = 1.0
-"""Time [s] that the robot gets to come to rest."""
-TURN_ANGLE = math.pi / 2
-"""Angle [rad] of the turn, to the left."""
-WAY_TOLERANCE = 0.1
-"""Accepted error [m] of the way over a terrain, by the robot's own estimate."""
-HOLD_TIME = 2.0
-"""Time [s] for which the paw is held up."""
+SPEED_TOLERANCE = 0.02  #: Accepted error [m/s] of the mean speed: a tenth of what is asked
+STOP_TIME = 1.0  #: Time [s] that the robot gets to come to rest
+TURN_ANGLE = math.pi / 2  #: Angle [rad] of the turn, to the left
+WAY_TOLERANCE = 0.1  #: Accepted error [m] of the way over a terrain, by the robot's own estimate
+HOLD_TIME = 2.0  #: Time [s] for which the paw is held up
 
 
 @dataclass(frozen=True, slots=True)
 class StepRun:
-    """One step that has just been run, ready to be measured.
+    """One step that has just been run, ready to be measured."""
 
-    Attributes:
-        outcome: of its last blocking call.
-        recording: what happened in it, at least one sample.
-    """
-
-    outcome: Outcome
-    recording: Recording
+    outcome: Outcome  #: of its last blocking call
+    recording: Recording  #: what happened in it, at least one sample
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,8 +168,7 @@ class DemoStep:
     """One step of the demo.
 
     Attributes:
-        name: identifies the step in reports.
-        label: says what is done, in at most 21 characters.
+        name, label: identify the step in reports, and say what is done, in at most 21 characters.
         act: does it; False means that it was not done, None that the figures must tell.
         measure: figures from what was measured, never from what was commanded.
     """
@@ -299,8 +287,7 @@ TERRAINS: Mapping[str, Terrain] = {
     ),
 }
 """What a robot that sees can be shown on, by name."""
-BEHIND = 0.6
-"""How far [m] behind the end of a terrain its way ends."""
+BEHIND = 0.6  #: How far [m] behind the end of a terrain its way ends
 
 
 def terrain_steps(terrain: Terrain) -> tuple[DemoStep, ...]:
@@ -320,3 +307,116 @@ def terrain_steps(terrain: Terrain) -> tuple[DemoStep, ...]:
     cross = DemoStep("cross", label, lambda go2: go2.move_forward(way), crossed)
     stand, _, walk = DEMO_STEPS[:3]
     return stand, walk, cross, replace(stand, name="stand_again")
+
+
+MEASUREMENT_RATE = 100.0  #: Samples a second from which the measurements of a step are taken
+TOTALS_RATE = 500.0  #: Samples a second for the least margins and loads: short dips count
+
+
+@dataclass(frozen=True, slots=True)
+class DemoProgress:
+    """Where a running demo is; told once when a step begins and once when it has ended.
+
+    Attributes:
+        index, count, label: of the step, from 0, how many there are, and what it does.
+        result: what came of it; None when it begins.
+    """
+
+    index: int
+    count: int
+    label: str
+    result: StepResult | None = None
+
+
+def run_demo(
+    go2: GO2Controller,
+    on_progress: Callable[[DemoProgress], None] | None = None,
+    steps: Sequence[DemoStep] = DEMO_STEPS,
+) -> DemoReport:
+    """Run the steps one after the other and measure each.
+
+    A failed step does not end the demo, a fall does: the steps after it are reported as not run.
+
+    Args:
+        go2: the robot; any plant, any configuration, lying or standing.
+        on_progress: is told when a step begins and when it has ended.
+
+    Raises:
+        PlantError: if the plant fails.
+        ClosedError: if the controller is closed.
+    """
+    report = on_progress or (lambda _progress: None)
+    failures_before = go2.telemetry.qp_failures
+    started, cpu_time = go2.state.time, 0.0
+    results: list[StepResult] = []
+    for index, step in enumerate(steps):
+        report(DemoProgress(index, len(steps), step.label))
+        result, used = _run_step(go2, step)
+        cpu_time += used
+        results.append(result)
+        report(DemoProgress(index, len(steps), step.label, result))
+    margin, load = three_leg_minima(_window(go2.recording(TOTALS_RATE), started, math.inf))
+    totals = DemoTotals(
+        peak_torque_ratio=go2.telemetry.peak_torque_ratio,
+        peak_speed_ratio=go2.telemetry.peak_speed_ratio,
+        least_support_margin=margin,
+        least_foot_load=load,
+        qp_failures=go2.telemetry.qp_failures - failures_before,
+        robot_time=go2.state.time - started,
+        cpu_time=cpu_time,
+    )
+    return DemoReport(tuple(results), totals)
+
+
+def three_leg_minima(recording: Recording) -> tuple[float, float]:
+    """Least support margin [m] and least load [N] of a supporting foot while on three legs.
+
+    Both are nan if the robot never stood on exactly three.
+    """
+    rows = recording.stance.sum(axis=1) == 3
+    if not rows.any():
+        return math.nan, math.nan
+    loads = recording.foot_forces[rows][recording.stance[rows]]
+    return float(recording.support_margin[rows].min()), float(loads.min())
+
+
+def _run_step(go2: GO2Controller, step: DemoStep) -> tuple[StepResult, float]:
+    """What came of ``step``, and the processor time [s] of control and physics."""
+    start, cpu_start = go2.state.time, time.process_time()
+    if go2.mode is Mode.FALLEN:
+        reason = "not run: the robot has fallen"
+        return StepResult(step.name, step.label, False, reason, start, 0.0), 0.0
+    try:
+        answer, refusal = step.act(go2), ""
+    except (PlantError, ClosedError):
+        raise
+    except Go2WbcError as error:
+        answer, refusal = False, str(error).splitlines()[0]
+    cpu_time = time.process_time() - cpu_start
+    end = go2.state.time
+    recording = _window(go2.recording(MEASUREMENT_RATE), start, end)
+    is_measured = not refusal and len(recording.time) > 0
+    figures = step.measure(StepRun(go2.last_outcome, recording)) if is_measured else ()
+    reason = refusal or _failure(go2, answer, figures)
+    result = StepResult(
+        step.name, step.label, not reason, reason or "done", start, end - start, figures
+    )
+    return result, cpu_time
+
+
+def _failure(go2: GO2Controller, answer: bool | None, figures: Sequence[Measurement]) -> str:
+    """Why a step does not count as done; empty if it does."""
+    if answer is False or not go2.last_outcome.ok:
+        return go2.last_outcome.reason
+    if go2.mode in (Mode.FALLEN, Mode.DAMPED):
+        return f"the robot is {go2.mode.value}"
+    missed = [str(figure) for figure in figures if not figure.is_met]
+    if missed:
+        return "; ".join(missed)
+    return "" if figures else "nothing was measured"
+
+
+def _window(recording: Recording, start: float, end: float) -> Recording:
+    """The samples from the last one at or before ``start`` up to ``end`` [s]."""
+    first, last = np.searchsorted(recording.time, (start + 1e-9, end + 1e-9))
+    return recording.part(slice(max(int(first) - 1, 0), int(last)))

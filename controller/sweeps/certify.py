@@ -30,10 +30,8 @@ if TYPE_CHECKING:
     from viz.content import CertifiedRate, ReplayContent
 
 RUNS = 200
-WORST = 5
-"""How many of the worst runs are named."""
-FEWEST = 20
-"""Runs before which nothing ends early."""
+WORST = 5  #: How many of the worst runs are named
+FEWEST = 20  #: Runs before which nothing ends early
 _HOLDS_FOR = ("version", "code", "plan", "libraries", "python")
 """What a page names of a certificate's ``about``, besides its world."""
 
@@ -43,9 +41,7 @@ class Certificate:
     """How often a motion was done.
 
     Attributes:
-        motion: its name.
-        n: runs that were looked at.
-        done: runs in which it was done.
+        motion, n, done: its name, runs that were looked at, and in which it was done.
         interval: of 95 % of the true rate.
         worst: the worst runs, the worst first: their rows in ``path``.
         about: what the certificate holds for: versions, and digests of code and plan.

@@ -50,32 +50,21 @@ order of a set of strings."""
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """Why an item has no value.
+    """Why an item has no value."""
 
-    Attributes:
-        text: in one line.
-        details: the traceback, or empty.
-        has_died: whether its process ended, again and again, rather than the function raising.
-    """
-
-    text: str
-    details: str = ""
+    text: str  #: in one line
+    details: str = ""  #: the traceback, or empty
     has_died: bool = False
+    """Whether its process ended, again and again, rather than the function raising."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ended(Generic[Item]):
-    """What came of one item: a value, or a failure.
+    """What came of one item: a value, or a failure."""
 
-    Attributes:
-        item: which.
-        value: what the function returned; None for a failure.
-        failure: why there is none.
-    """
-
-    item: Item
-    value: Any = None
-    failure: Failure | None = None
+    item: Item  #: which
+    value: Any = None  #: what the function returned; None for a failure
+    failure: Failure | None = None  #: why there is none
 
 
 Ends = Generator[Ended[Item], None, None]
@@ -84,17 +73,12 @@ Ends = Generator[Ended[Item], None, None]
 
 @final
 class Trials(Generic[Item]):
-    """The items of a run, by their numbers: what is to be sent, and how often it was.
-
-    Attributes:
-        pickled: the items, to be sent.
-        waiting: those that no process has.
-    """
+    """The items of a run, by their numbers: what is to be sent, and how often it was."""
 
     def __init__(self, items: Sequence[Item], attempts: int) -> None:
         """All wait; one whose process dies is tried ``attempts`` times."""
-        self.pickled = [pickle.dumps(item) for item in items]
-        self.waiting = deque(range(len(items)))
+        self.pickled = [pickle.dumps(item) for item in items]  #: the items, to be sent
+        self.waiting = deque(range(len(items)))  #: those that no process has
         self._items, self._attempts, self._deaths = items, attempts, Counter[int]()
 
     def ended(self, number: int, answer: bytes) -> Ended[Item]:
@@ -141,8 +125,9 @@ def answer(order: bytes, item: bytes) -> bytes:
     except (Exception, SystemExit) as error:
         text = traceback.format_exception_only(error)[-1].strip()
         return pickle.dumps((None, Failure(text, _told(error))))
-    finally:
-        _tidy_up()
+    finally:  # of what it has left: robots hold tens of megabytes of records, in cycles
+        gc.collect()
+        _keep_the_rest()
 
 
 def _told(error: BaseException) -> str:
@@ -153,12 +138,6 @@ def _told(error: BaseException) -> str:
             break
         trace = trace.tb_next
     return "".join(traceback.format_exception(type(error), error, trace))
-
-
-def _tidy_up() -> None:
-    """Free what the item has left: robots hold tens of megabytes of records, in cycles."""
-    gc.collect()
-    _keep_the_rest()
 
 
 _keep_the_rest = cache(gc.freeze)

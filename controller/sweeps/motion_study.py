@@ -40,15 +40,10 @@ def plan_of(archive: bytes) -> CompiledPlan:
 
 @dataclass(frozen=True, slots=True)
 class MotionStudy:
-    """Plays a motion, unchecked, on a robot that has got up.
+    """Plays a motion, unchecked, on a robot that has got up."""
 
-    Attributes:
-        archive: its compiled plan, as ``archive_of`` gives it.
-        world: each seed plays in a sample of it.
-    """
-
-    archive: bytes
-    world: World
+    archive: bytes  #: its compiled plan, as ``archive_of`` gives it
+    world: World  #: each seed plays in a sample of it
 
     def __call__(self, seed: int) -> Row:
         """Whether it was done, what went wrong, and what was measured.
@@ -112,20 +107,14 @@ def world_of(text: str) -> World:
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """A run of a motion with a seed.
+    """A run of a motion with a seed."""
 
-    Attributes:
-        title: what was run.
-        row: what was measured now.
-        differences: the values that are not those of the row that is kept; none, to the last bit,
-            under the same version, on the same kind of processor.
-        content: what ``viz`` shows of it.
-    """
-
-    title: str
-    row: Row
+    title: str  #: what was run
+    row: Row  #: what was measured now
     differences: tuple[str, ...]
-    content: ReplayContent
+    """The values that are not those of the row that is kept; none, to the last bit, under the same
+    version, on the same kind of processor."""
+    content: ReplayContent  #: what ``viz`` shows of it
 
 
 def replay(path: Path | str, seed: int) -> Replay:

@@ -12,35 +12,23 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, final
 
-from controller.sweeps.engine import (
-    ONE_THREAD,
-    Ends,
-    Engine,
-    Item,
-    Trials,
-    answer,
-    order_of,
-    processors,
-)
-from go2_wbc.errors import MissingDependency, SweepError
-from go2_wbc.extras import install_line
+from controller.sweeps import engine
+from go2_wbc.errors import MissingDependency, SweepError, install_line
 
 ATTEMPTS = 4
 """How often an item is tried whose process or machine dies: it takes a moment until a machine is
 missed, and it may be given the same item once more."""
-QUEUED = 2
-"""Items in the hands of the cluster for each of its processors: none waits for the next."""
+QUEUED = 2  #: Items in the hands of the cluster for each of its processors: none waits for the next
 QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_NUM_REDIS_GET_RETRIES": "3"}
 """Ray tells nobody of its use, and does not look for minutes for a cluster that does not answer."""
-PATIENCE = 10.0
-"""Time [s] in which something must listen at the address of a cluster."""
+PATIENCE = 10.0  #: Time [s] in which something must listen at the address of a cluster
 ON_LOOPBACK = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
 """Ray on this machine only listens on 127.0.0.1, as it does elsewhere than on Linux by default. Its
 argument for the address does not: it replaces 127.0.0.1 by one that others reach."""
 
 
 @final
-class RayEngine(Engine):
+class RayEngine(engine.Engine):
     """Runs items on the processors of a Ray cluster.
 
     A process or machine that dies costs no item its result: its items are tried again elsewhere.
@@ -61,7 +49,9 @@ class RayEngine(Engine):
         self._address = address or os.environ.get("RAY_ADDRESS") or None
         _ray(QUIET if self._address else QUIET | ON_LOOPBACK)
 
-    def run(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Ends[Item]:
+    def run(
+        self, function: Callable[[engine.Item], Any], items: Sequence[engine.Item]
+    ) -> engine.Ends[engine.Item]:
         """What came of each item; see ``Engine.run``.
 
         Raises:
@@ -70,11 +60,11 @@ class RayEngine(Engine):
         if not items:
             return
         with self._connected() as ray:
-            order = ray.put(order_of(function))
-            call = ray.remote(num_cpus=1, max_retries=0, runtime_env={"env_vars": ONE_THREAD})(
-                answer
-            )
-            trials, running = Trials(items, ATTEMPTS), dict[Any, int]()
+            order = ray.put(engine.order_of(function))
+            call = ray.remote(
+                num_cpus=1, max_retries=0, runtime_env={"env_vars": engine.ONE_THREAD}
+            )(engine.answer)
+            trials, running = engine.Trials(items, ATTEMPTS), dict[Any, int]()
             there = int(ray.cluster_resources().get("CPU", 1))
             size = self._workers or max(QUEUED * there, 1)
             while trials.waiting or running:
@@ -96,7 +86,7 @@ class RayEngine(Engine):
     def _connected(self) -> Iterator[Any]:
         """Ray, connected to the cluster; afterwards not."""
         ray = _ray(QUIET)
-        started = {"num_cpus": self._workers or processors(), "include_dashboard": False}
+        started = {"num_cpus": self._workers or engine.processors(), "include_dashboard": False}
         try:
             _require_listener(self._address or "")
             ray.init(

@@ -12,18 +12,16 @@ from jaxtyping import Bool, Float, Int
 from controller.sweeps.summary import mean_interval, rate_interval
 from controller.sweeps.sweep_file import SEED, Columns, Row
 from go2_wbc.errors import CommandError, unknown_name
-from viz.render.study_plots import Relation
+from viz.render.plots import Relation
 
 DRAWN = ("friction", "mass_scale", "joint_friction", "angle", "phase")
 """Columns of our own studies that a seed varies (``trials``, ``studies``, ``motion_study``)."""
 CLOSEST = "closest_share"
 """Column of a motion's sweep: how much of its closest limit a run took; the rest is its margin."""
-MOST_VALUES = 12
-"""A parameter with more values than these is cut into bins."""
+MOST_VALUES = 12  #: A parameter with more values than these is cut into bins
 PER_BIN, MOST_BINS = 12, 8
 """Runs of a bin at least, where there are enough of them, and bins along a line at most."""
-PER_CELL, MOST_CELLS = 8, 6
-"""The same of a grid, along each side."""
+PER_CELL, MOST_CELLS = 8, 6  #: The same of a grid, along each side
 
 
 def relations(rows: Sequence[Row], columns: Columns, over: Sequence[str] = ()) -> list[Relation]:
@@ -69,7 +67,8 @@ def _relation(
     known = np.isfinite([values, *parameters.values()]).all(axis=0)
     values, axes = values[known], [given[known] for given in parameters.values()]
     line = len(axes) == 1
-    most = min(len(values) // PER_BIN, MOST_BINS) if line else _side(len(values))
+    along, across = len(values) // PER_BIN, math.isqrt(len(values) // PER_CELL)
+    most = min(along, MOST_BINS) if line else min(across, MOST_CELLS)
     groups, labels = zip(*(_bins(axis, max(most, 2)) for axis in axes), strict=True)
     shape = tuple(len(names) for names in labels)
     cells = np.ravel_multi_index(groups, shape)
@@ -85,10 +84,6 @@ def _relation(
         places=np.array(places),
         dots=np.column_stack([axes[0], values]) if line and not is_rate else np.zeros((0, 2)),
     )
-
-
-def _side(n: int) -> int:
-    return min(math.isqrt(n // PER_CELL), MOST_CELLS)
 
 
 def _bins(

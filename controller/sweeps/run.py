@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 import re
 import time
@@ -9,16 +11,17 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from controller.sweeps.engine import Engine, Failure, LocalEngine, processors
 from controller.sweeps.sweep_file import SEED, Columns, Row, SweepFile
 from controller.sweeps.targets import digest, target_of
 from go2_wbc.arguments import typed
 from go2_wbc.brief import brief, inline_html
-from go2_wbc.errors import CommandError, SweepError, unknown_name
+from go2_wbc.errors import CommandError, MissingDependency, SweepError, install_line, unknown_name
+from go2_wbc.files import checked_output, write_atomically
 
-FOLDER = Path("out/sweeps")
-"""Where rows are kept if nothing else is said."""
+FOLDER = Path("out/sweeps")  #: Where rows are kept if nothing else is said
 ENGINES = ("local", "ray")
 
 
@@ -232,3 +235,62 @@ def _require_count(name: str, value: object, *, least: int) -> None:
 def _slug(name: str) -> str:
     """``name`` as the name of a file."""
     return re.sub(r"[^\w.@+-]+", "_", Path(name).name).strip("._") or "sweep"
+
+
+EXPORT_SUFFIXES = (".csv", ".parquet")
+
+
+def export_rows(result: SweepResult, path: Path | str) -> Path:
+    """Write the rows to a ``.csv`` or ``.parquet`` file, in the order of their seeds.
+
+    Both keep every number to the last bit. Parquet keeps the kinds of the columns, too.
+
+    Returns:
+        The absolute path.
+
+    Raises:
+        ConfigError: for a path that cannot be written, or another ending.
+        MissingDependency: for Parquet without pyarrow.
+    """
+    target = checked_output(path, EXPORT_SUFFIXES)
+    is_csv = target.suffix.lower() == ".csv"
+    return write_atomically(target, _csv(result) if is_csv else _parquet(result))
+
+
+def require_exporter(path: Path | str) -> None:
+    """See that what an export needs is there, before the work begins; raises as ``export_rows``."""
+    if checked_output(path, EXPORT_SUFFIXES).suffix.lower() == ".parquet":
+        _pyarrow()
+
+
+def _csv(result: SweepResult) -> bytes:
+    text = io.StringIO(newline="")
+    table = csv.DictWriter(text, [SEED, *result.columns])
+    table.writeheader()
+    table.writerows(result.rows)  # a float as its shortest text, which reads back as it was
+    return text.getvalue().encode()
+
+
+def _parquet(result: SweepResult) -> bytes:
+    pyarrow, parquet = _pyarrow()
+    kinds = {
+        "float": pyarrow.float64(),
+        "int": pyarrow.int64(),
+        "bool": pyarrow.bool_(),
+        "str": pyarrow.string(),
+    }
+    columns = {SEED: "int", **result.columns}
+    schema = pyarrow.schema([(name, kinds[kind]) for name, kind in columns.items()])
+    stream = io.BytesIO()
+    parquet.write_table(pyarrow.Table.from_pylist(result.rows, schema=schema), stream)
+    return stream.getvalue()
+
+
+def _pyarrow() -> tuple[Any, Any]:
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError as error:
+        line = install_line("sweep")
+        raise MissingDependency(f"Parquet needs pyarrow ({error}): {line}") from error
+    return pyarrow, parquet

@@ -11,27 +11,19 @@ import numpy as np
 
 from controller.sweeps.sweep_file import Columns, Row
 
-CONFIDENCE = 0.95
-"""How sure an interval is to hold the true rate or mean."""
+CONFIDENCE = 0.95  #: How sure an interval is to hold the true rate or mean
 PERCENTILES = (5.0, 50.0, 95.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """A truth value over all rows.
+    """A truth value over all rows."""
 
-    Attributes:
-        name: of the column.
-        n: how many rows have it.
-        count: in how many it is true.
-        low, high: 95 % interval of the true rate (Clopper and Pearson, 1934).
-    """
-
-    name: str
-    n: int
-    count: int
-    low: float
-    high: float
+    name: str  #: of the column
+    n: int  #: how many rows have it
+    count: int  #: in how many it is true
+    low: float  #: 95 % interval of the true rate (Clopper and Pearson, 1934)
+    high: float  #: its other end
 
     @property
     def rate(self) -> float:
@@ -41,42 +33,26 @@ class Rate:
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """A number over all rows.
+    """A number over all rows."""
 
-    Attributes:
-        name: of the column.
-        n: how many rows have a number that is finite; the rest counts for it only.
-        mean: of these.
-        low, high: 95 % interval of the true mean (Student's t); nan for fewer than two rows.
-        least, most: extremes.
-        percentiles: the 5th, the 50th and the 95th.
-    """
-
-    name: str
-    n: int
-    mean: float
-    low: float
-    high: float
-    least: float
-    most: float
-    percentiles: tuple[float, ...]
+    name: str  #: of the column
+    n: int  #: how many rows have a number that is finite; the rest counts for it only
+    mean: float  #: of these
+    low: float  #: 95 % interval of the true mean (Student's t); nan for fewer than two rows
+    high: float  #: its other end
+    least: float  #: of all
+    most: float  #: of all
+    percentiles: tuple[float, ...]  #: the 5th, the 50th and the 95th
 
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """A text over all rows.
+    """A text over all rows."""
 
-    Attributes:
-        name: of the column.
-        n: how many rows have one that is not empty.
-        kinds: how many different ones there are.
-        commonest: the most frequent one, and its number.
-    """
-
-    name: str
-    n: int
-    kinds: int
-    commonest: tuple[str, int] | None
+    name: str  #: of the column
+    n: int  #: how many rows have one that is not empty
+    kinds: int  #: how many different ones there are
+    commonest: tuple[str, int] | None  #: the most frequent one, and its number
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,17 +23,13 @@ from go2_wbc.errors import ConfigError, SweepError
 from go2_wbc.files import checked_output
 
 Value = float | int | bool | str
-Row = Mapping[str, Value]
-"""What a function gives for a seed, by the names of the columns."""
+Row = Mapping[str, Value]  #: What a function gives for a seed, by the names of the columns
 Columns = dict[str, str]
 """The kind of every column, "float", "int", "bool" or "str", in the order of the first row."""
 
-SEED = "seed"
-"""The column that no function may give: it is there already."""
-MOST_COLUMNS = 1000
-"""As many columns as a table of SQLite holds, less some to spare."""
-_WHOLE = range(-(2**63), 2**63)
-"""Whole numbers that SQLite keeps."""
+SEED = "seed"  #: The column that no function may give: it is there already
+MOST_COLUMNS = 1000  #: As many columns as a table of SQLite holds, less some to spare
+_WHOLE = range(-(2**63), 2**63)  #: Whole numbers that SQLite keeps
 
 
 def row_of(given: object) -> Row:
@@ -93,12 +89,9 @@ def _common(name: str, kind: str, other: str) -> str:
 
 
 SUFFIXES = (".sqlite", ".db")
-APPLICATION = 0x60277377
-"""What SQLite's header says of whose file it is."""
-FORMAT = 1
-"""The version of these tables."""
-PATIENCE = 60.0
-"""Time [s] for which another process may keep the file to itself."""
+APPLICATION = 0x60277377  #: What SQLite's header says of whose file it is
+FORMAT = 1  #: The version of these tables
+PATIENCE = 60.0  #: Time [s] for which another process may keep the file to itself
 _TABLES = (
     "CREATE TABLE IF NOT EXISTS about (name TEXT PRIMARY KEY, value) WITHOUT ROWID",
     "CREATE TABLE IF NOT EXISTS columns (place INTEGER PRIMARY KEY, name TEXT UNIQUE, kind TEXT)",
@@ -114,8 +107,7 @@ _CAUSES = {
     sqlite3.SQLITE_READONLY: "it cannot be written to: choose another file",
     sqlite3.SQLITE_BUSY: f"another process has kept it to itself for {PATIENCE:g} s",
 }
-About = Mapping[str, str | bytes]
-"""What rows depend on besides the seed, by name."""
+About = Mapping[str, str | bytes]  #: What rows depend on besides the seed, by name
 
 
 class SweepFile:

@@ -26,11 +26,9 @@ if TYPE_CHECKING:
 
 
 ROOT = Path(__file__).resolve().parents[2]
-SOURCES = ("go2_wbc", "motions", "controller")
-"""Packages whose code decides what a run gives."""
+SOURCES = ("go2_wbc", "motions", "controller")  #: Packages whose code decides what a run gives
 LIBRARIES = ("mujoco", "pin", "placo", "proxsuite", "numpy")
-_SHOWN = 12
-"""Digits of a digest that are kept."""
+_SHOWN = 12  #: Digits of a digest that are kept
 
 
 def digest(content: bytes) -> str:
@@ -61,23 +59,17 @@ FORMS = (
     "gait:NAME[@VX[,VY[,WZ]]], push:IMPULSE[@SPEED], or a function (seed) -> row as "
     "FILE.py:NAME or MODULE:NAME"
 )
-SPEED = 0.5
-"""Speed [m/s] of a gait or a pushed robot of which nothing is said."""
+SPEED = 0.5  #: Speed [m/s] of a gait or a pushed robot of which nothing is said
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What is swept.
+    """What is swept."""
 
-    Attributes:
-        name: as a person calls it.
-        function: from a seed to a row; can be pickled.
-        about: what its rows depend on besides the project's code.
-    """
-
-    name: str
-    function: Callable[[int], object]
+    name: str  #: as a person calls it
+    function: Callable[[int], object]  #: from a seed to a row; can be pickled
     about: Mapping[str, str | bytes] = field(default_factory=dict)
+    """What its rows depend on besides the project's code."""
 
     @property
     def job(self) -> Job:
@@ -92,15 +84,10 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What a worker calls: the function of a target, after a look whether its code is the same.
+    """What a worker calls: the function of a target, after a look whether its code is the same."""
 
-    Attributes:
-        function: from a seed to a row.
-        code: the code and libraries that the rows depend on, as the parent has them.
-    """
-
-    function: Callable[[int], object]
-    code: tuple[str, str]
+    function: Callable[[int], object]  #: from a seed to a row
+    code: tuple[str, str]  #: the code and libraries that the rows depend on, as the parent has them
 
     def __call__(self, seed: int) -> Row:
         """The row of a seed.
@@ -125,17 +112,11 @@ def own_code() -> tuple[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class LoadedFunction:
-    """A function of a module or file, found again in every process.
+    """A function of a module or file, found again in every process."""
 
-    Attributes:
-        place: the dotted name of a module, or the path of a file.
-        name: of the function.
-        content: digest of the file.
-    """
-
-    place: str
-    name: str
-    content: str
+    place: str  #: the dotted name of a module, or the path of a file
+    name: str  #: of the function
+    content: str  #: digest of the file
 
     def __call__(self, seed: int) -> object:
         """What the function gives.

@@ -32,8 +32,7 @@ FRICTION_RANGE = (0.5, 1.0)
 NOMINAL_FRICTION = 0.8
 MASS_RANGE = (0.9, 1.1)
 """Factor on every mass and inertia of the robot; the controller is not told."""
-YAW_RANGE = (-math.pi, math.pi)
-"""Heading [rad] at the start."""
+YAW_RANGE = (-math.pi, math.pi)  #: Heading [rad] at the start
 JOINT_NOISE = 0.05
 """Standard deviation [rad] of the joint angles from which the robot sinks to the ground."""
 
@@ -96,9 +95,7 @@ class TrialRobot:
     """A robot on trial, lying at first: calls succeed, or ``TrialFailed`` is raised.
 
     Attributes:
-        go2: the controller.
-        plant: the simulated robot, for pushes.
-        truth: what MuJoCo says.
+        go2, plant, truth: the controller, the simulated robot, for pushes, and what MuJoCo says.
     """
 
     def __init__(self, trial: Trial | MujocoPlant, config: Config | None = None) -> None:
@@ -147,27 +144,18 @@ class TrialRobot:
 
 START_TIME = 1.5
 """Time [s] after a command that is left out: the ramp takes 0.7 s, settling the rest."""
-WINDOW = 5.0
-"""Time [s] over which the velocity is compared with the command."""
-PUSH_TIME = 0.1
-"""Duration [s] of a push."""
-RECOVERY_TIME = 2.0
-"""Time [s] after a push until the robot is looked at."""
-_STREAM = 1
-"""Keeps the numbers of a push apart from those of the robot and its world."""
+WINDOW = 5.0  #: Time [s] over which the velocity is compared with the command
+PUSH_TIME = 0.1  #: Duration [s] of a push
+RECOVERY_TIME = 2.0  #: Time [s] after a push until the robot is looked at
+_STREAM = 1  #: Keeps the numbers of a push apart from those of the robot and its world
 
 
 @dataclass(frozen=True, slots=True)
 class GaitStudy:
-    """Walks with a velocity, on flat ground.
+    """Walks with a velocity, on flat ground."""
 
-    Attributes:
-        gait: its name.
-        command: forward and left [m/s], turning left [rad/s].
-    """
-
-    gait: str
-    command: VelocityCommand
+    gait: str  #: its name
+    command: VelocityCommand  #: forward and left [m/s], turning left [rad/s]
 
     def __call__(self, seed: int) -> Row:
         """Velocity errors [m/s], [rad/s] over 5 s, loads as shares of the limits."""
@@ -193,15 +181,10 @@ class GaitStudy:
 
 @dataclass(frozen=True, slots=True)
 class PushStudy:
-    """Pushes the base of a trotting or standing robot, from any side, at any time of the stride.
+    """Pushes the base of a trotting or standing robot, from any side, at any time of the stride."""
 
-    Attributes:
-        impulse: of the push [N s], over 0.1 s.
-        speed: at which the robot trots [m/s]; 0 stands.
-    """
-
-    impulse: float
-    speed: float
+    impulse: float  #: of the push [N s], over 0.1 s
+    speed: float  #: at which the robot trots [m/s]; 0 stands
 
     def __call__(self, seed: int) -> Row:
         """Whether it stayed up, where the push came from, how far [m] and fast [m/s] it went."""

@@ -33,29 +33,20 @@ MESSAGES = (
 )
 """What each outcome of ``solve_qp`` says."""
 
-VIOLATION = 1e-10
-"""Violation, relative to 1 + |bound|, below which a row counts as met."""
+VIOLATION = 1e-10  #: Violation, relative to 1 + |bound|, below which a row counts as met
 DEPENDENT = 1e-18
 """Squared share of a normal outside the working set's span below which it counts as inside."""
-MAX_STEPS = 400
-"""Rows taken in or dropped. 44 rows needed 40 at most (own measurement)."""
+MAX_STEPS = 400  #: Rows taken in or dropped. 44 rows needed 40 at most (own measurement)
 
 
 class WorkingSet(NamedTuple):
-    """The rows that are met with equality; how many they are, q, goes beside it.
+    """The rows that are met with equality; how many they are, q, goes beside it."""
 
-    Attributes:
-        J, R: J' N = (R; 0), see the module.
-        rows: the number of each row, negative for an equality.
-        u: their multipliers.
-        taken: whether each inequality is among them.
-    """
-
-    J: Square
+    J: Square  #: J' N = (R; 0), see the module
     R: Square
-    rows: Int[np.ndarray, " n"]
-    u: Vector
-    taken: Taken
+    rows: Int[np.ndarray, " n"]  #: the number of each row, negative for an equality
+    u: Vector  #: their multipliers
+    taken: Taken  #: whether each inequality is among them
 
 
 @subroutine

@@ -12,8 +12,7 @@ from jaxtyping import Float
 from go2_wbc.compilation import subroutine
 from go2_wbc.records import V3, Array3, Array3x3, Array4
 
-Axes = tuple[V3, V3, V3]
-"""The three axes of a frame."""
+Axes = tuple[V3, V3, V3]  #: The three axes of a frame
 
 
 @subroutine
@@ -146,8 +145,7 @@ def quaternion_of(R: Array3x3, q: Array4) -> None:
 
 Vector = Float[np.ndarray, " n"]
 Square = Float[np.ndarray, "n n"]
-DEFINITE = 1e-14
-"""Share of a diagonal entry of H that must be left as its pivot."""
+DEFINITE = 1e-14  #: Share of a diagonal entry of H that must be left as its pivot
 
 
 @subroutine

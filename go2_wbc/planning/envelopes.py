@@ -21,7 +21,7 @@ from jaxtyping import Float
 
 from go2_wbc.contacts import GAITS, Gait
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
-from go2_wbc.robot.profile import RobotProfile, find_profile
+from go2_wbc.robot.description import RobotProfile, find_profile
 
 FILE = Path(__file__).with_name("envelopes.json")
 """Written by ``python -m benchmarks envelopes --store``."""

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 from go2_wbc.records import ArrayNx3
-from go2_wbc.robot.profile import GO2
+from go2_wbc.robot.description import GO2
 from go2_wbc.robot.state import JointCommand, PartFault, RobotState
 
 

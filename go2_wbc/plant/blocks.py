@@ -6,10 +6,8 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
-HALF_WIDTH = 5.0
-"""Half width [m] of stairs, ramps and patches."""
-PLATFORM = 10.0
-"""Length [m] of the level ground behind the last step."""
+HALF_WIDTH = 5.0  #: Half width [m] of stairs, ramps and patches
+PLATFORM = 10.0  #: Length [m] of the level ground behind the last step
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,8 +15,7 @@ class Block:
     """A box that is fixed to the world.
 
     Attributes:
-        centre: of the box [m].
-        half_size: half of its sides [m].
+        centre, half_size: of the box, and half of its sides [m].
         yaw: by which it is turned about z [rad].
         pitch: by which it is turned about its own y axis before [rad]; positive lowers its +x end.
         friction: sliding friction coefficient on it, in the place of the plant's; None for that.

@@ -87,9 +87,7 @@ class InjectedFault:
     """Something that breaks.
 
     Attributes:
-        kind: of fault.
-        part: what breaks.
-        at: plant time [s].
+        kind, part, at: what breaks how, and when [s].
         value: see ``FaultKind``.
     """
 

@@ -33,16 +33,12 @@ from go2_wbc.robot.state import JointCommand, RobotState
 
 SPEEDS = (0.25, 0.5, 1.0, 1.5)
 """Joint speeds [rad/s]; the dry part shows at the low ones, the viscous part at the high ones."""
-CYCLES = (1, 1, 2, 3)
-"""How often a joint goes to and fro at each."""
-AMPLITUDE = 0.4
-"""Half the way [rad] of a joint."""
-STEADY = 0.5
-"""Share of each way, around its middle, in which the servo has settled on the speed."""
+CYCLES = (1, 1, 2, 3)  #: How often a joint goes to and fro at each
+AMPLITUDE = 0.4  #: Half the way [rad] of a joint
+STEADY = 0.5  #: Share of each way, around its middle, in which the servo has settled on the speed
 OVER_THE_BACK = (0.5, 2.6, -1.75)
 """Angles [rad] of a left leg's joints amid their ways: thigh backwards and up, foot in the air."""
-OUTWARDS = 0.6
-"""Hip angle [rad] of a left leg at which it swings past trunk and ground."""
+OUTWARDS = 0.6  #: Hip angle [rad] of a left leg at which it swings past trunk and ground
 FOLDED = (0.3, 1.30, -2.66)
 """Angles [rad] of a left leg's joints in the end: folded beside the trunk."""
 TILT, HEIGHT = 0.35, 0.13
@@ -51,13 +47,11 @@ DAMPING, LIMP_TIME = 3.0, 0.3
 """Damping [N m s/rad] of the limp robot, and for how long [s] it is sent in the end."""
 VISCOUS_SHARE = 0.75
 """Share of the viscous friction that is fed forward: too much of it puts power into the joint."""
-CERTAIN = 2.0
-"""Standard errors by which the viscous friction might be less than was measured."""
+CERTAIN = 2.0  #: Standard errors by which the viscous friction might be less than was measured
 KP, KD = 80.0, 3.0
 """Stiffness [N m/rad] and damping [N m s/rad] of the servo: dry friction of 1.4 N m holds it off by
 1 deg."""
-SPEED_TOLERANCE = 0.2
-"""Share by which a joint may miss the speed that it shall have."""
+SPEED_TOLERANCE = 0.2  #: Share by which a joint may miss the speed that it shall have
 MISFIT = 0.1
 """Difference [N m] between the measured friction and the straight line, root mean square, beyond
 which the line says nothing."""
@@ -68,10 +62,8 @@ class FrictionEstimate:
     """What was identified: FL hip, thigh, calf, then FR, RL, RR.
 
     Attributes:
-        dry: dry friction [N m].
-        viscous: viscous friction [N m s/rad].
-        dry_error: standard error of ``dry`` [N m].
-        viscous_error: standard error of ``viscous`` [N m s/rad].
+        dry, viscous: friction [N m], [N m s/rad].
+        dry_error, viscous_error: their standard errors.
     """
 
     dry: Float[np.ndarray, "12"]

@@ -48,13 +48,10 @@ class SensorNoise:
     fifth), and of a consumer MEMS unit sampled at 500 Hz.
 
     Attributes:
-        position: base position [m], as from an estimator or motion capture.
-        linear_velocity: base linear velocity [m/s].
+        position, linear_velocity: of the base [m], [m/s], as from an estimator or motion capture.
         orientation: base orientation, rotation vector [rad].
-        gyro: angular velocity [rad/s].
-        accelerometer: specific force [m/s^2].
-        joint_position: encoder [rad].
-        joint_velocity: encoder, differentiated [rad/s].
+        gyro, accelerometer: angular velocity [rad/s] and specific force [m/s^2].
+        joint_position, joint_velocity: encoder [rad], and differentiated [rad/s].
         foot_force: foot sensor [N].
     """
 
@@ -105,8 +102,7 @@ class SensorNoise:
         return turned / np.linalg.norm(turned)
 
 
-NONE = SensorNoise(*[0.0] * 8)
-"""The truth."""
+NONE = SensorNoise(*[0.0] * 8)  #: The truth
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,12 +118,9 @@ class SensorErrors:
     (angle 2 pi / 32768, speed 2 pi / 256 rad/s of the rotor, gear 6.33).
 
     Attributes:
-        gyro: white noise per sample [rad/s].
-        gyro_bias: deviation of its bias [rad/s].
-        accelerometer: white noise per sample [m/s^2].
-        accelerometer_bias: deviation of its bias [m/s^2].
-        angle_step: resolution of a joint's angle [rad].
-        speed_step: resolution of a joint's velocity [rad/s].
+        gyro, gyro_bias: white noise per sample, and deviation of its bias [rad/s].
+        accelerometer, accelerometer_bias: the same [m/s^2].
+        angle_step, speed_step: resolution of a joint's angle [rad] and velocity [rad/s].
         speed: white noise on it [rad/s], own choice: five steps.
         force: white noise on a foot's force [N].
         force_step: resolution of a foot's force [N]; the robot sends whole numbers.

@@ -71,10 +71,8 @@ class Boxes(Terrain):
         )
 
 
-UP, DOWN, BOTH = "up", "down", "both"
-"""Ways of stairs."""
-TREAD = 0.04
-"""Thickness [m] of a step with an open riser."""
+UP, DOWN, BOTH = "up", "down", "both"  #: Ways of stairs
+TREAD = 0.04  #: Thickness [m] of a step with an open riser
 
 
 @typed()
@@ -226,8 +224,7 @@ class Ramp(Terrain):
         )
 
 
-STRIPS = 16
-"""Flat strips of which a wave is made."""
+STRIPS = 16  #: Flat strips of which a wave is made
 
 
 @typed()

@@ -2,14 +2,19 @@
 
 Every model of the project (Pinocchio, MuJoCo, PlaCo, meshcat) is built from the files named here,
 so that any two of them can be compared number by number.
+
+What no URDF says of a robot stands in its profile, ``profiles/NAME.toml``, which names its files.
 """
 
 from __future__ import annotations
 
 import math
 import sys
+import tomllib
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +22,118 @@ import numpy as np
 from jaxtyping import Int
 
 from go2_wbc.brief import brief
-from go2_wbc.errors import DescriptionError
+from go2_wbc.errors import ConfigError, DescriptionError, unknown_name
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
-from go2_wbc.records import Array3, ArrayNx3
-from go2_wbc.robot.profile import GO2, RobotProfile, find_profile
+from go2_wbc.records import V3, Array3, Array6, Array12, ArrayNx3
+
+GO2 = "go2"  #: Name of the robot where none is given
+FOLDER = Path(__file__).with_name("profiles")
+SPLAY = 0.3
+"""Angle [rad] of hips that put the feet beside them, so that the folded legs carry nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotProfile:
+    """A robot, beside its URDF. Triples of joints are hip, thigh, calf.
+
+    Attributes:
+        name: what ``robot=`` takes.
+        title: what people call it.
+        description: its folder in the ``example-robot-data`` package.
+        foot_radius: radius [m] of the spherical feet.
+        hip_limit: angle [rad] beyond which no hip is turned, if the URDF's range is wider.
+        imu_place: place [m] of the IMU in the base frame.
+        armature: rotor inertia seen at the joints [kg m^2].
+        damping: viscous friction of simulated joints [N m s/rad].
+        friction_loss: their dry friction [N m].
+        knee_share: speed from which a driving motor's torque falls, as a share of the speed
+            without load (``robot.motor``).
+        envelope: speeds ahead, back, aside [m/s] and turning rate [rad/s] within which it trots
+            in simulation where nothing is configured.
+        stand_height: height [m] of the CoM above the ground when standing.
+        sit: height [m] of the base and pitch [rad] of the dog-like sit: rump down, front legs up.
+        lie_height: height [m] of the base just above the ground, from which it goes limp.
+        tucked: joint angles [rad] with the feet under the hips and the belly on the ground.
+        underside: points [m] of the trunk in the base frame that touch flat ground first, within
+            1 cm, at tilts up to 60 deg.
+        motions: arguments that motions of the library are given unless told otherwise, by motion.
+        config: tables of the configuration (``go2_wbc.config``) that are other than the usual.
+    """
+
+    name: str
+    title: str
+    description: str
+    foot_radius: float
+    hip_limit: float
+    imu_place: V3
+    armature: V3
+    damping: V3
+    friction_loss: V3
+    knee_share: float
+    envelope: tuple[float, float, float, float]
+    stand_height: float
+    sit: tuple[float, float]
+    lie_height: float
+    tucked: V3
+    underside: tuple[V3, ...]
+    motions: Mapping[str, Mapping[str, float]] = field(default_factory=dict, hash=False)
+    config: Mapping[str, Any] = field(default_factory=dict, hash=False)
+
+    __repr__ = brief
+
+    @property
+    def stand_pose(self) -> Array6:
+        """CoM position [m] in the motion's frame, then roll, pitch, yaw [rad], when standing."""
+        return np.array([0.0, 0.0, self.stand_height, 0.0, 0.0, 0.0])
+
+    @property
+    def sit_pose(self) -> Array6:
+        """Base position [m] and roll, pitch, yaw [rad] when sitting."""
+        return np.array([0.0, 0.0, self.sit[0], 0.0, self.sit[1], 0.0])
+
+    @property
+    def lie_pose(self) -> Array6:
+        """Base position [m] and roll, pitch, yaw [rad] just above lying."""
+        return np.array([0.0, 0.0, self.lie_height, 0.0, 0.0, 0.0])
+
+    @property
+    def tucked_joints(self) -> Array12:
+        """Joint angles [rad] with the legs folded below the trunk."""
+        return np.tile(self.tucked, 4)
+
+    @property
+    def splayed_joints(self) -> Array12:
+        """Joint angles [rad] with the folded legs beside the trunk."""
+        return self.tucked_joints + np.tile([SPLAY, 0.0, 0.0, -SPLAY, 0.0, 0.0], 2)
+
+    @property
+    def underside_points(self) -> ArrayNx3:
+        """``underside`` as an array."""
+        return np.array(self.underside)
+
+
+def profile_names() -> tuple[str, ...]:
+    """The robots that ship."""
+    return tuple(sorted(file.stem for file in FOLDER.glob("*.toml")))
+
+
+@cache
+def find_profile(name: str = GO2) -> RobotProfile:
+    """The profile of a robot that ships.
+
+    Raises:
+        ConfigError: for an unknown one; lists the valid ones.
+    """
+    if name not in profile_names():
+        raise ConfigError(unknown_name("robot", str(name), profile_names()))
+    values = tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
+    numbers: dict[str, Any] = {key: _tuples(value) for key, value in values.items()}
+    return RobotProfile(name=name, **numbers)
+
+
+def _tuples(value: object) -> object:
+    return tuple(_tuples(part) for part in value) if isinstance(value, list) else value
+
 
 BASE_LINK = "base"
 INSTALL_LINE = "pip install example-robot-data"
@@ -36,12 +149,10 @@ class RobotDescription:
 
     Attributes:
         profile: what the URDF does not say of the robot.
-        urdf_path: the URDF.
-        srdf_path: the SRDF, or ``None`` if there is none.
+        urdf_path, srdf_path: the URDF, and the SRDF or ``None`` if there is none.
         package_dirs: folders against which ``package://`` mesh names resolve, first match wins.
         disabled_pairs: pairs of links that the SRDF excludes from collision.
-        efforts: torque limit of each joint [N m], in the order of ``JOINT_NAMES``.
-        speeds: speed limit of each joint [rad/s], in the order of ``JOINT_NAMES``.
+        efforts, speeds: limits of each joint [N m], [rad/s], in the order of ``JOINT_NAMES``.
         mass: of all links [kg].
         origins: of each joint in the frame of the one above it [m], in the order of
             ``JOINT_NAMES``; those of hips in the frame of the base.
@@ -226,8 +337,7 @@ class MeshPart:
     """All faces of a mesh file that have one colour.
 
     Attributes:
-        points: (n, 3) vertices [m] in the frame of the file.
-        triangles: (m, 3) rows of ``points``.
+        points, triangles: (n, 3) vertices [m] in the frame of the file, and (m, 3) rows of them.
         rgba: red, green, blue, opacity in 0..1.
     """
 

@@ -102,8 +102,8 @@ class EstimatorConfig:
     touchdown_time: float = 0.009
     vertical: float = 0.1
     vertical_share: float = 0.1
-    landing: float = 1000.0
-    landing_time: float = 0.01
+    landing: float = 5.0
+    landing_time: float = 0.05
     compliance: float = 5e-5
     longest_step: float = 0.1
 

@@ -66,12 +66,13 @@ UPWARDS, UPWARDS_LASTS = 0.85, 0.1
 """Share of it by which it points up or down, and how long [s] it lasts then: feet slide sideways,
 and a trot that believes it rises falls soon. Of sound ones 0.05 at most."""
 STRUCK = 0.3
-"""Time [s] for which it has to last as long as any other, after a foot has borne more than the
-robot's weight: where commands act late robots land so hard, their feet spring back, and 2 sound
-ones of 20 were named in reversals."""
+"""Time [s] after a foot has borne more than the robot's weight: an error that begins then has to
+last as long as any other: where commands act late, and on waves, robots land so hard, their feet
+spring back, and 2 sound ones of 20 were named in reversals."""
 PUSHED = 0.6
 """Share of it by which the legs push the robot sideways, as they do if all feet slide together:
-what the accelerometer feels then is true."""
+what the accelerometer feels then is true. An error makes the robot lean, and its weight then pushes
+as well; but the legs lack the whole error of what is felt."""
 
 TILTED, TILT_LASTS, TILT_SHARE = 2.0, 0.1, 0.7
 """Once the gyro has erred, an error of the accelerometer is a tilt that it has left: taken back
@@ -98,7 +99,7 @@ class WatchedImu(Record):
         speed: of the IMU by the accelerometer, drawn to that by the feet [m/s].
         excess, most_excess: error of the accelerometer, smoothed once more, and the greatest while
             there is one [m/s^2].
-        push: by which the legs push, smoothed [m/s^2].
+        push, lack: by which the legs push, smoothed, and less what it feels [m/s^2].
         force_off, force_time: the same as of the gyro, of the accelerometer [m/s^2].
         turn: by which the gyro has turned whoever believed it until now [rad].
         gyro_is_off, force_is_off: 1 for what is broken.
@@ -127,6 +128,7 @@ class WatchedImu(Record):
     excess: Array3
     most_excess: float
     push: Array3
+    lack: Array3
     force_off: Array3
     force_time: float
     turn: Array3
@@ -139,7 +141,7 @@ class WatchedImu(Record):
 def note_bearing(m: WatchedImu, is_calm: bool, is_borne: bool, dt: float) -> None:
     """Count how long its legs have carried it; the gaps between steps do not count."""
     m.unborne = 0.0 if is_borne else m.unborne + dt
-    m.struck = max(m.struck - dt, 0.0)
+    m.struck = max(m.struck - dt, 0.0) if m.force_time == 0.0 else m.struck
     if not is_calm or m.unborne > BETWEEN_STEPS:
         m.stood = 0.0
     elif is_borne:
@@ -149,10 +151,11 @@ def note_bearing(m: WatchedImu, is_calm: bool, is_borne: bool, dt: float) -> Non
 
 
 @subroutine
-def note_push(m: WatchedImu, push: V3, dt: float) -> None:
-    """Smooth what the legs push by, sum f / m."""
+def note_push(m: WatchedImu, push: V3, force: V3, dt: float) -> None:
+    """Smooth what the legs push by, sum f / m, and how much less the accelerometer feels."""
     for k in range(3):
         m.push[k] += dt / SETTLING * (push[k] - m.push[k])
+        m.lack[k] += dt / SETTLING * (push[k] - force[k] - m.lack[k])
 
 
 @subroutine
@@ -300,8 +303,9 @@ def judge_accelerometer(
     excess, push = triple(m.excess), triple(m.push)
     amount, rise = np.sqrt(dot(excess, excess)), dot(excess, up)
     is_upwards = abs(rise) > UPWARDS * amount
-    sideways = dot(push, excess) - rise * dot(push, up)
-    is_pushed = sideways > PUSHED * (amount**2 - rise**2)
+    sideways, square = plus_scaled(excess, -rise, up), amount**2 - rise**2
+    is_pushed = dot(push, sideways) > PUSHED * square
+    is_pushed = is_pushed and dot(triple(m.lack), sideways) > (PUSHED - 1.0) * square
     if amount < max(FORCE_LIMIT * (FINER if is_fine else 1.0), STAYING * m.most_excess):
         m.force_time = m.most_excess = 0.0
     elif stands and (is_tilt or is_upwards or not is_pushed):

@@ -37,8 +37,7 @@ POSTURE_WEIGHT, DAMPING = 1e-4, 1e-6
 the QP of a step definite at singularities."""
 MAX_STEP, CONVERGED_STEP = 0.3, 1e-7
 """Longest change [rad or m] of a coordinate in one step, and that below which it has converged."""
-MAX_ITERATIONS = 200
-"""Of each of the two phases."""
+MAX_ITERATIONS = 200  #: Of each of the two phases
 POSITION_TOLERANCE, ANGLE_TOLERANCE, CONSTRAINT_TOLERANCE = 1e-4, 1e-3, 1e-5
 """Largest error [m] of a foot or of the height, [rad] of the orientation and of a raised leg's
 joints, and violation [m, rad] of CoM margin and joint limits."""
@@ -53,8 +52,7 @@ class PoseTargets:
 
     Attributes:
         p_world_feet: foot centres [m]; the row of a raised leg is not used.
-        rpy: roll, pitch, yaw [rad] of the trunk.
-        height: height [m] of the base's origin.
+        rpy, height: roll, pitch, yaw [rad] of the trunk, and height [m] of the base's origin.
         raised: leg in the air, if any; its joints stay as they are at the start.
         com_margin: least distance [m] of the CoM to the edges of the support polygon.
         joint_margin: least distance [rad] of every joint to its limits.

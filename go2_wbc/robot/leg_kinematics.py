@@ -49,19 +49,12 @@ from go2_wbc.robot.model import LEG_AXES, RobotModel
 
 @dataclass(frozen=True, slots=True)
 class LegGeometry:
-    """Lengths of a leg.
+    """Lengths of a leg."""
 
-    Attributes:
-        p_base_hip: origin of the hip's axis in the base frame [m].
-        width: distance [m] from the hip's axis to the plane of the leg, positive to the left.
-        thigh: from the thigh's axis to the knee [m].
-        calf: from the knee to the foot's centre [m].
-    """
-
-    p_base_hip: Array3
-    width: float
-    thigh: float
-    calf: float
+    p_base_hip: Array3  #: origin of the hip's axis in the base frame [m]
+    width: float  #: distance [m] from the hip's axis to the plane of the leg, positive to the left
+    thigh: float  #: from the thigh's axis to the knee [m]
+    calf: float  #: and from there to the foot's centre [m]
 
     @staticmethod
     def of(model: RobotModel, leg: Leg) -> LegGeometry:
@@ -88,17 +81,12 @@ class Legs(Record):
 
 
 class Links(Record):
-    """Trunk, then hip, thigh and calf of each leg.
+    """Trunk, then hip, thigh and calf of each leg."""
 
-    Attributes:
-        share: of the robot's mass.
-        p_com: CoM [m] in the frame of the link's joint.
-        p_joint: place of that joint [m] in the frame of the link before; the trunk's is its own.
-    """
-
-    share: Float[np.ndarray, "13"]
-    p_com: Float[np.ndarray, "13 3"]
+    share: Float[np.ndarray, "13"]  #: of the robot's mass
+    p_com: Float[np.ndarray, "13 3"]  #: CoM [m] in the frame of the link's joint
     p_joint: Float[np.ndarray, "13 3"]
+    """Place of that joint [m] in the frame of the link before; the trunk's is its own."""
 
 
 def leg_table(model: RobotModel) -> Legs:
@@ -309,15 +297,11 @@ def settle(
 
 @dataclass(frozen=True, slots=True)
 class LegAngles:
-    """Joint angles that bring a foot to its places, as near as the leg reaches.
+    """Joint angles that bring a foot to its places, as near as the leg reaches."""
 
-    Attributes:
-        q: (n, 3) hip, thigh and calf angle [rad].
-        miss: (n,) distance [m] by which each place is out of the leg's reach; 0 within it.
-    """
-
-    q: ArrayNx3
+    q: ArrayNx3  #: (n, 3) hip, thigh and calf angle [rad]
     miss: Float[np.ndarray, " n"]
+    """(n,) distance [m] by which each place is out of the leg's reach; 0 within it."""
 
 
 def leg_angles(geometry: LegGeometry, p_base_foot: ArrayNx3) -> LegAngles:

@@ -20,8 +20,7 @@ from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS
 from go2_wbc.records import Array3, Array4x3, Array12, Array18, Array19, layout_of
 from go2_wbc.robot.description import RobotDescription, find_description
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
-from go2_wbc.robot.payload import NO_PAYLOAD, Payload
-from go2_wbc.robot.rigid_body import RigidBodies, fill_snapshot
+from go2_wbc.robot.rigid_body import NO_PAYLOAD, Payload, RigidBodies, fill_snapshot
 from go2_wbc.robot.state import RobotState, Snapshot
 from go2_wbc.world import PAYLOAD_HALF_SIZE, World
 
@@ -31,8 +30,7 @@ LEG_AXES = ("JointModelRX", "JointModelRY", "JointModelRY")
 FINGERPRINT_DECIMALS = 9
 """Decimals of the numbers [SI units] that count: what a file was computed for stays the same robot
 if another Pinocchio rounds its last digits differently."""
-FINGERPRINT = 16
-"""Letters of a fingerprint."""
+FINGERPRINT = 16  #: Letters of a fingerprint
 
 
 class RobotModel:
@@ -42,12 +40,9 @@ class RobotModel:
         description: the files that the robot was loaded from.
         profile: what they do not say of it.
         pin_model: Pinocchio's model, with rotor inertia.
-        foot_radius: radius [m] of the spherical feet.
-        mass: total mass [kg].
-        gravity: 9.81 [m/s^2].
+        foot_radius, mass, gravity: radius [m] of the spherical feet, total mass [kg], 9.81 [m/s^2].
         motor: what the motors give at which speed.
-        torque_limits: (12,) [N m], the motors' peak.
-        speed_limits: (12,) [rad/s].
+        torque_limits, speed_limits: (12,) the motors' peak [N m], and [rad/s].
         q_lower, q_upper: (12,) joint limits [rad], the tighter of URDF and published ones.
         p_base_imu: (3,) place of the IMU in the base frame [m].
         p_base_hips: (4, 3) hip abduction axes' origins in the base frame [m].
@@ -96,7 +91,6 @@ class RobotModel:
         self._read_constants()
 
     def __repr__(self) -> str:
-        """Of which robot, and how heavy."""
         return f"<RobotModel: {self.profile.title}, {self.mass:.2f} kg>"
 
     def _read_constants(self) -> None:

@@ -260,15 +260,10 @@ class JointFriction:
 
 @dataclass(frozen=True, slots=True)
 class FrictionFeedForward:
-    """Turns the torques of the dynamics into the motors', within what these give at their speeds.
+    """Turns torques of the dynamics into the motors', within what these give at their speeds."""
 
-    Attributes:
-        friction: what is fed forward.
-        motor: what gives it.
-    """
-
-    friction: JointFriction
-    motor: MotorModel
+    friction: JointFriction  #: what is fed forward
+    motor: MotorModel  #: what gives it
 
     def motor_torques(self, snapshot: Snapshot, qdd: Array18, tau: Array12) -> Array12:
         """``tau`` [N m] and the friction at the acceleration ``qdd``."""

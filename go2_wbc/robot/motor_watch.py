@@ -26,9 +26,8 @@ NOISY_SPEED, SPEED_SHARE = 1.0, 0.1
 """Error of a joint's speed [rad/s], and share of it by which it errs besides: it is read with
 noise, and changes within a tick if the robot is flung. Times the damping gain it is torque that
 seems to be asked for: of half of it sound motors were named in `recover`."""
-WEAK, DEAD = 0.65, 0.46
-"""Share below which it is broken, and below which it is dead: of one that has just died so much is
-left in the sums when it is named, and half a torque is half a torque."""
+WEAK, DEAD = 0.65, 0.25
+"""Share below which it is broken, and below which, since then, it is dead."""
 LASTS = 0.12
 """For how long [s]: of sound motors, in the worlds of the tables, 0.02 at most."""
 
@@ -39,11 +38,14 @@ class WatchedMotors(Record):
     Attributes:
         given, asked: the sums [N^2 m^2].
         weak_time: for how long the share has been too low [s].
+        weak_given, weak_asked: sums over that time [N^2 m^2].
     """
 
     given: Array12
     asked: Array12
     weak_time: Array12
+    weak_given: Array12
+    weak_asked: Array12
 
 
 @kernel
@@ -73,7 +75,10 @@ def watch_motors(
         s.asked[j] = keep * s.asked[j] + (1.0 - keep) * asked * asked
         least_asked = ASKED + kd[j] * (NOISY_SPEED + SPEED_SHARE * abs(v[6 + j]))
         is_weak = s.asked[j] > least_asked * least_asked and s.given[j] < WEAK * WEAK * s.asked[j]
-        s.weak_time[j] = s.weak_time[j] + dt if is_weak else 0.0
+        since = 1.0 if is_weak else 0.0
+        s.weak_time[j] = since * (s.weak_time[j] + dt)
+        s.weak_given[j] = since * (s.weak_given[j] + given[j] * given[j])
+        s.weak_asked[j] = since * (s.weak_asked[j] + asked * asked)
         if s.weak_time[j] > LASTS and found < 0:
             found = j
     return found
@@ -104,7 +109,8 @@ class MotorWatch:
         if joint < 0:
             return
         name = JOINT_NAMES[joint]
-        share = float(np.sqrt(self._state.given[joint] / self._state.asked[joint]))
+        asked_since = max(float(self._state.weak_asked[joint]), ASKED**2)
+        share = float(np.sqrt(self._state.weak_given[joint] / asked_since))
         self._state.weak_time[joint] = 0.0
         if all(fault.part != f"motor of {name}" for fault in self.faults):
             is_dead = share < DEAD

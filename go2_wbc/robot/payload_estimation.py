@@ -35,14 +35,13 @@ from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.records import V3, Array3, Array6, Array12, Array18, Record, packed
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import JointFriction, friction_torque
-from go2_wbc.robot.payload import NO_PAYLOAD, Payload
+from go2_wbc.robot.rigid_body import NO_PAYLOAD, Payload
 from go2_wbc.robot.state import RobotState, Snapshot
 from go2_wbc.validation import FINITE, POSITIVE, SHARE, between, ranged, require
 
 PERIOD = 0.02
 """Time [s] from one change of the belief to the next: much less than its response takes."""
-NOTHING = 0.02
-"""Mass [kg] at which a belief that fades has ended."""
+NOTHING = 0.02  #: Mass [kg] at which a belief that fades has ended
 
 
 @typed()
@@ -103,31 +102,19 @@ class PayloadConfig:
 
 @dataclass(frozen=True, slots=True)
 class PayloadNumbers:
-    """What the wrench of a payload is computed with, besides the snapshot.
+    """What the wrench of a payload is computed with, besides the snapshot."""
 
-    Attributes:
-        config: when anything is felt.
-        gravity: [m/s^2].
-        friction: what the joints take of the torques.
-    """
-
-    config: PayloadConfig
-    gravity: float
-    friction: JointFriction
+    config: PayloadConfig  #: when anything is felt
+    gravity: float  #: [m/s^2]
+    friction: JointFriction  #: what the joints take of the torques
 
 
 class PayloadWrench(Record):
-    """What a payload takes of the standing feet, in the base frame.
+    """What a payload takes of the standing feet, in the base frame."""
 
-    Attributes:
-        force: [N].
-        moment: about the base's origin [N m].
-        weight: of a unit of mass, by gravity and the base's acceleration [m/s^2].
-    """
-
-    force: Array3
-    moment: Array3
-    weight: Array3
+    force: Array3  #: [N]
+    moment: Array3  #: about the base's origin [N m]
+    weight: Array3  #: of a unit of mass, by gravity and the base's acceleration [m/s^2]
 
 
 @subroutine

@@ -13,12 +13,16 @@ computed along the axes of its hip, which the hip's angle turns about x from the
 calf turn about y of these axes, so that few rotations are left.
 
 A body is its mass m, its first moment h = m c and its inertia I = (xx, xy, xz, yy, yz, zz), both
-about the origin of its joint.
+about the origin of its joint. The trunk may carry a
+point mass beside its own parts.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+import pinocchio as pin
 from jaxtyping import Float
 
 from go2_wbc.algebra.linear import (
@@ -35,44 +39,48 @@ from go2_wbc.algebra.linear import (
 )
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.records import V3, Array4x3, Array12, Array18, Array19, Record
-from go2_wbc.robot.payload import Payload
 from go2_wbc.robot.state import Snapshot
+from go2_wbc.validation import FINITE, NOT_NEGATIVE, ranged
+
+
+@dataclass(frozen=True, slots=True)
+@ranged(mass=NOT_NEGATIVE, place=FINITE)
+class Payload:
+    """A point mass that is fixed to the trunk."""
+
+    mass: float = 0.0  #: [kg]
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: in the base frame [m]
+
+    @property
+    def inertia(self) -> pin.Inertia:
+        """About the base's origin."""
+        return pin.Inertia(self.mass, np.array(self.place), np.zeros((3, 3)))
+
+
+NO_PAYLOAD = Payload()  #: The robot carries nothing
+
 
 Inertia = tuple[float, float, float, float, float, float]
 Body = tuple[float, V3, Inertia]
 LegBodies = tuple[float, float, V3, V3, V3, V3, Body, Body, Body]
 """Cosine and sine of the hip's angle, places and bodies: see ``place_leg``."""
-Wrench = tuple[V3, V3]
-"""Force and moment."""
+Wrench = tuple[V3, V3]  #: Force and moment
 _ZERO = (0.0, 0.0, 0.0)
 
 
 class RigidBodies(Record):
-    """The robot's numbers: of trunk, then hip, thigh and calf of each leg.
+    """The robot's numbers: of trunk, then hip, thigh and calf of each leg."""
 
-    Attributes:
-        mass: of all [kg], with the payload.
-        gravity: [m/s^2].
-        foot_radius: [m].
-        link_mass: [kg]; the payload is in the trunk's, as in the next two.
-        link_moment: first moment [kg m].
-        link_inertia: as of a body [kg m^2].
-        p_joints: places of the joints [m] in the frame of the link before.
-        p_calf_feet: places of the feet's centres [m].
-        armature: inertia of the rotors [kg m^2].
-        payload: what the trunk carries.
-    """
-
-    mass: float
-    gravity: float
-    foot_radius: float
-    link_mass: Float[np.ndarray, "13"]
-    link_moment: Float[np.ndarray, "13 3"]
-    link_inertia: Float[np.ndarray, "13 6"]
-    p_joints: Float[np.ndarray, "12 3"]
-    p_calf_feet: Array4x3
-    armature: Array12
-    payload: Payload
+    mass: float  #: of all [kg], with the payload
+    gravity: float  #: [m/s^2]
+    foot_radius: float  #: [m]
+    link_mass: Float[np.ndarray, "13"]  #: [kg]; the payload is in the trunk's, as in the next two
+    link_moment: Float[np.ndarray, "13 3"]  #: first moment [kg m]
+    link_inertia: Float[np.ndarray, "13 6"]  #: as of a body [kg m^2]
+    p_joints: Float[np.ndarray, "12 3"]  #: places of the joints [m] in the frame of the link before
+    p_calf_feet: Array4x3  #: places of the feet's centres [m]
+    armature: Array12  #: inertia of the rotors [kg m^2]
+    payload: Payload  #: what the trunk carries
 
 
 @subroutine

@@ -18,12 +18,11 @@ from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.compilation import Foreign, kernel
 from go2_wbc.records import Array4, Array12, Array18, Array19, ArrayNx3
-from go2_wbc.robot.profile import RobotProfile, find_profile
+from go2_wbc.robot.description import RobotProfile, find_profile
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.validation import POSITIVE, ranged
 
-TOUCH = 0.01
-"""Height [m] of the trunk's lowest point over the ground below which it touches."""
+TOUCH = 0.01  #: Height [m] of the trunk's lowest point over the ground below which it touches
 ASTRAY_TOUCH = 0.025
 """The same [m] for a trunk that is not where it shall be: feet press into the ground in a fall, and
 an attitude that is off by a degree puts the nose off by 5 mm."""
@@ -31,8 +30,7 @@ STRIKE = 0.05
 """Time [s] of a touch from which on it counts until the trunk is back. With 0.03 two of sixteen
 trots counted as fallen that a push of 50 N s ahead let touch the ground, and that trotted on."""
 
-UNIT_TOLERANCE = 0.01
-"""How far the norm of a measured quaternion may be from 1."""
+UNIT_TOLERANCE = 0.01  #: How far the norm of a measured quaternion may be from 1
 
 
 @kernel
@@ -91,7 +89,7 @@ class SafetyConfig:
         stale_limit: time [s] without news from the plant after which it counts as silent.
         qp_patience: QP failures in a row after which the robot is damped for good.
         grave_limit_time: time [s] for which its constraints may give way by more than
-            ``wbc.relaxation.LIMITS`` before it is damped for good; after pushes that a trot
+            ``wbc.solvers.LIMITS`` before it is damped for good; after pushes that a trot
             withstood 0.036 at most (a hip at its stop).
     """
 

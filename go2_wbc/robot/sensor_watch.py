@@ -328,9 +328,11 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
         place, u, force, slack[leg] = leg_motion(c.legs.geometry[leg], q, v, tau)
         put(place, places[leg])
         put(less_rolling(q, v, u, w, up, c.foot_radius), speeds[leg])
-        borne[leg], push = force[2], plus_scaled(push, per_mass, force)
+        borne[leg] = force[2]
+        if r.foot_forces[leg] > UNFELT or s.force_is_wrong[leg] > 0.0:  # a stretched leg errs
+            push = plus_scaled(push, per_mass, force)
     moved = plus_scaled(triple(r.accelerometer), -c.gravity, up)
-    note_push(m, push, dt)
+    note_push(m, push, triple(r.accelerometer), dt)
     is_up = up[2] > UPRIGHT
     is_borne = is_up and borne.sum() > CARRIED * c.weight
     is_told = dot(moved, moved) < THROWN**2 and noise_of_gyro(s.speed_noise) == 0.0
@@ -338,7 +340,8 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
     for leg in range(4):
         watch_force(s, r, leg, borne[leg], slack[leg], is_borne, dt)
         stands = r.foot_forces[leg] > SENSED or borne[leg] - slack[leg] > LOADED
-        bears = stands and borne[leg] > LOADED and is_sound(s, leg)
+        is_felt = r.foot_forces[leg] > UNFELT  # one that is lifted presses, and moves
+        bears = is_felt and stands and borne[leg] > LOADED and is_sound(s, leg)
         s.stood[leg] = s.stood[leg] + dt if bears else 0.0
         m.struck = STRUCK if max(borne[leg], r.foot_forces[leg]) > c.weight else m.struck
         loads[leg] = borne[leg] if bears and m.unborne == 0.0 else 0.0

@@ -21,7 +21,7 @@ from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.errors import CommandError
 from go2_wbc.records import Array3, Array3x3, Array4, Array4x3, Array12, Array18, Array19, Record
-from go2_wbc.robot.profile import RobotProfile, find_profile
+from go2_wbc.robot.description import RobotProfile, find_profile
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,6 @@ class RobotState:
     feet_in_contact: Bool[np.ndarray, "4"]
 
     def __repr__(self) -> str:
-        """When and where."""
         place = ", ".join(f"{part:.3f}" for part in self.p_world_base.tolist())
         angles = ", ".join(f"{angle:.1f}" for angle in np.degrees(self.rpy).tolist())
         return f"RobotState(at {self.time:.3f} s: base ({place}) m, rpy ({angles}) deg)"
@@ -115,9 +114,7 @@ class SensorReading:
         time: robot time [s].
         gyro: angular velocity [rad/s] in the base frame.
         accelerometer: specific force [m/s^2] in the base frame; +9.81 upwards at rest.
-        q_joints: joint angles [rad].
-        v_joints: joint velocities [rad/s].
-        tau: joint torques [N m].
+        q_joints, v_joints, tau: joint angles [rad], velocities [rad/s] and torques [N m].
         foot_forces: normal force at each foot [N].
     """
 
@@ -219,6 +216,24 @@ class JointCommand:
         """Torques [N m] asked for at angles ``q`` and velocities ``v``, before any limit."""
         return self.kp * (self.q_des - q) + self.tau + self.kd * (self.v_des - v)
 
+    def numbers(self) -> Float[np.ndarray, "5 12"]:
+        """All of it, in the order above.
+
+        Raises:
+            CommandError: for a value that is not finite, or an array of another shape.
+        """
+        names = self.__dataclass_fields__
+        rows = [getattr(self, name) for name in names]
+        for name, row in zip(names, rows, strict=True):
+            if row.shape != (12,):
+                raise CommandError(f"command.{name} must have shape (12,), got {row.shape}")
+        numbers = np.array(rows, dtype=float)
+        if not math.isfinite(np.vdot(numbers, numbers)):  # cheap, but huge numbers overflow
+            for name, row in zip(names, rows, strict=True):
+                if not np.isfinite(row).all():
+                    raise CommandError(f"command.{name} is not finite: {row}")
+        return numbers
+
     @staticmethod
     def torque(tau: Array12) -> JointCommand:
         """Pure torque: no stiffness, no damping."""
@@ -245,8 +260,7 @@ class Snapshot(Record):
     """State and dynamics of one tick. Accelerations use Pinocchio's spatial base acceleration.
 
     Attributes:
-        state: the measured state that everything here belongs to.
-        profile: of the robot.
+        state, profile: the measured state that everything here belongs to, and that of the robot.
         q, v: its configuration and velocity.
         R_world_base: base orientation.
         mass_matrix: M(q) with rotor inertia.

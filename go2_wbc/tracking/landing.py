@@ -62,49 +62,31 @@ same: a tenth of the way to the edge of their support. Far jumps land half as fa
 
 @dataclass(frozen=True, slots=True)
 class Landings:
-    """What came of a plan's landings.
+    """What came of a plan's landings."""
 
-    Attributes:
-        missed: feet that had no contact even ``TIME_OUT`` after they should have come down.
-        error: greatest distance [m], on the level, of a foot that had landed from the place where
-            the plan, as it was placed at its start, wanted it; None if none has landed.
-    """
-
-    missed: int
+    missed: int  #: feet that had no contact even ``TIME_OUT`` after they should have come down
     error: float | None
+    """Greatest distance [m], on the level, of a foot that had landed from the place where the plan,
+    as it was placed at its start, wanted it; None if none has landed."""
 
 
 class SteppingFoot(Record):
-    """A foot that steps.
+    """A foot that steps."""
 
-    Attributes:
-        planned: what the plan asked of its leg at last, a value of ``LegTask``.
-        is_in_air: whether it has lifted off and not come down.
-        is_awaited: whether how far from its place it lands is still to be judged.
-        touchdown: when it came down [s]; -inf if it has not yet.
-    """
-
-    planned: float
-    is_in_air: bool
-    is_awaited: bool
-    touchdown: float
+    planned: float  #: what the plan asked of its leg at last, a value of ``LegTask``
+    is_in_air: bool  #: whether it has lifted off and not come down
+    is_awaited: bool  #: whether how far from its place it lands is still to be judged
+    touchdown: float  #: when it came down [s]; -inf if it has not yet
 
 
 class Landing(Record):
-    """Where a plan is, which landings move, and how its feet are.
+    """Where a plan is, which landings move, and how its feet are."""
 
-    Attributes:
-        anchor: where the plan is now.
-        origin: where it was at first.
-        feet: all of them.
-        missed, error: see ``Landings``.
-    """
-
-    anchor: Anchor
-    origin: Anchor
-    feet: tuple[SteppingFoot, SteppingFoot, SteppingFoot, SteppingFoot]
-    missed: float
-    error: float
+    anchor: Anchor  #: where the plan is now
+    origin: Anchor  #: where it was at first
+    feet: tuple[SteppingFoot, SteppingFoot, SteppingFoot, SteppingFoot]  #: all of them
+    missed: float  #: see ``Landings``
+    error: float  #: see ``Landings``
 
     @staticmethod
     def at(anchor: Anchor) -> Landing:

@@ -21,48 +21,36 @@ from go2_wbc.contacts import TIE
 from go2_wbc.records import packed
 from go2_wbc.reference import STANCE, Target
 
-CURVES = 30
-"""How many curves a plan has."""
+CURVES = 30  #: How many curves a plan has
 JOINTS_FROM, FEET_FROM = 6, 18
 """The first curve of the joints, and of the feet; those of the body come before."""
 
 
 @dataclass(frozen=True, slots=True)
 class StanceLoad:
-    """Bounds of the normal force of a foot that stands.
-
-    Attributes:
-        ramp: time [s] over which it takes up its load after touchdown and gives it up before
-            lift-off.
-        least, greatest: bounds [N] once it has taken it up.
-    """
+    """Bounds of the normal force of a foot that stands."""
 
     ramp: float
-    least: float
-    greatest: float
+    """Time [s] over which it takes up its load after touchdown and gives it up before lift-off."""
+    least: float  #: bound [N] once it has taken it up
+    greatest: float  #: the other one [N]
 
 
 @dataclass(frozen=True, slots=True)
 class PlanCurves:
-    """Cubics and a contact schedule.
-
-    Attributes:
-        knots: (n + 1,) instants [s] between which the curves are cubics, from 0.
-        pieces: (4, n, ``CURVES``) their coefficients, the cube's first, of the time since the knot.
-        events: (m,) instants [s] at which the legs' tasks change.
-        tasks: (m, 4) what the legs do from each event on, values of ``LegTask``.
-        since, until: (m, 4) when [s] each foot's contact changed last, and changes next, where its
-            load is ramped.
-        load: of the feet that stand.
-    """
+    """Cubics and a contact schedule."""
 
     knots: Float[np.ndarray, " k"]
+    """(n + 1,) instants [s] between which the curves are cubics, from 0."""
     pieces: Float[np.ndarray, "4 n c"]
-    events: Float[np.ndarray, " m"]
+    """(4, n, ``CURVES``) their coefficients, the cube's first, of the time since the knot."""
+    events: Float[np.ndarray, " m"]  #: (m,) instants [s] at which the legs' tasks change
     tasks: Float[np.ndarray, "m 4"]
+    """(m, 4) what the legs do from each event on, values of ``LegTask``."""
     since: Float[np.ndarray, "m 4"]
-    until: Float[np.ndarray, "m 4"]
-    load: StanceLoad
+    """(m, 4) when [s] each foot's contact changed last, where its load is ramped."""
+    until: Float[np.ndarray, "m 4"]  #: (m, 4) when [s] it changes next, likewise
+    load: StanceLoad  #: of the feet that stand
 
     def __post_init__(self) -> None:
         """Have the load's numbers in a row."""

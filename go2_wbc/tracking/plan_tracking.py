@@ -45,8 +45,7 @@ from go2_wbc.robot.state import Snapshot
 from go2_wbc.tracking.landing import Landing, Landings, land
 from go2_wbc.tracking.plan_curves import StanceLoad
 
-PAIR = 2
-"""Feet that hold a trunk along the line between them, and not across it."""
+PAIR = 2  #: Feet that hold a trunk along the line between them, and not across it
 HEIGHT_PER_WEIGHT = 0.00055
 """Correction [m/N] that a payload's weight takes; this and the next two as found with 2 to 6 kg, up
 to 15 cm beside the middle."""
@@ -56,56 +55,37 @@ ROLL_PER_MOMENT, PITCH_PER_MOMENT = 0.08, 0.0085
 
 @dataclass(frozen=True, slots=True)
 class Deviation:
-    """How far a robot has been off its plan, on the average over the ticks so far.
+    """How far a robot has been off its plan, on the average over the ticks so far."""
 
-    Attributes:
-        place: of the tracked point [m].
-        attitude: angle of the trunk [rad].
-        joints: angle [rad] of the worst joint of a raised leg, over the ticks that had one; None
-            if there was none.
-    """
-
-    place: float
-    attitude: float
+    place: float  #: of the tracked point [m]
+    attitude: float  #: angle of the trunk [rad]
     joints: float | None
+    """Angle [rad] of the worst joint of a raised leg, over the ticks that had one; None if there
+    was none."""
 
 
 class Correction(Record):
-    """What has been integrated.
+    """What has been integrated."""
 
-    Attributes:
-        offset: of the reference: position [m] and rotation vector [rad], in the world.
-        carried: what the offset would have to do against the payload that is known, in the heading
-            frame: upward [m], about the axis ahead and the one aside [rad].
-        knows_payload: whether ``carried`` has been found yet.
-    """
-
-    offset: Array6
+    offset: Array6  #: of the reference: position [m] and rotation vector [rad], in the world
     carried: Array3
-    knows_payload: bool
+    """What the offset would have to do against the payload that is known, in the heading frame:
+    upward [m], about the axis ahead and the one aside [rad]."""
+    knows_payload: bool  #: whether ``carried`` has been found yet
 
 
 class Tracking(Record):
-    """State of a plan that is followed.
+    """State of a plan that is followed."""
 
-    Attributes:
-        landing: where the plan is, and its feet.
-        correction: of the trunk's target.
-        place, attitude, joints: see ``Deviation``.
-        ticks, raised_ticks: how many there have been, and of those with a raised leg.
-        sag: depth [m] of the tracked point below the plan, now.
-        lean: angle [rad] between the measured vertical of the trunk and the plan's, now.
-    """
-
-    landing: Landing
-    correction: Correction
-    place: float
+    landing: Landing  #: where the plan is, and its feet
+    correction: Correction  #: of the trunk's target
+    place: float  #: see ``Deviation``, as for the next two
     attitude: float
     joints: float
-    ticks: float
-    raised_ticks: float
-    sag: float
-    lean: float
+    ticks: float  #: how many there have been
+    raised_ticks: float  #: how many of them with a raised leg
+    sag: float  #: depth [m] of the tracked point below the plan, now
+    lean: float  #: angle [rad] between the measured vertical of the trunk and the plan's, now
 
 
 class PlanTracker:
@@ -135,6 +115,12 @@ class PlanTracker:
         steps = contact, self._events, self._changes, self._load
         follow(snapshot, t, dt, *steps, self._state, target)
         return Reference.of_row(target.row)
+
+    def follow_ground(self, snapshot: Snapshot, share: float) -> None:
+        """Move the plan by this share of the way to the mean height of the feet."""
+        p_world = self._state.landing.anchor.p_world
+        height = float(snapshot.p_world_feet[:, 2].mean()) - snapshot.foot_radius
+        p_world[2] += share * (height - p_world[2])
 
     @property
     def anchor(self) -> Anchor:
@@ -310,8 +296,7 @@ def tracked_position(snapshot: Snapshot, point: TrackedPoint) -> Array3:
     return snapshot.p_world_com if point is TrackedPoint.COM else snapshot.state.p_world_base
 
 
-MOST_FEET = 2
-"""Standing feet up to which the feedback is the plan's; more can give any moment."""
+MOST_FEET = 2  #: Standing feet up to which the feedback is the plan's; more can give any moment
 
 
 def fed_back(

@@ -64,19 +64,13 @@ that are not finite."""
 
 
 class Reduction(Record):
-    """What follows from the unknowns u.
+    """What follows from the unknowns u."""
 
-    Attributes:
-        legs: (3): the joints' accelerations of the stance legs, legs (a_b, 1).
-        dynamics: (1): the base's rows.
-        base: (4): that of the base, a_b = base (u, 1).
-        affine: the decision, z = affine (u, 1).
-    """
-
-    dynamics: BaseRows
+    dynamics: BaseRows  #: (1): the base's rows
     legs: Float[np.ndarray, "12 7"]
-    base: Float[np.ndarray, "6 13"]
-    affine: Float[np.ndarray, "30 13"]
+    """(3): the joints' accelerations of the stance legs, legs (a_b, 1)."""
+    base: Float[np.ndarray, "6 13"]  #: (4): that of the base, a_b = base (u, 1)
+    affine: Float[np.ndarray, "30 13"]  #: the decision, z = affine (u, 1)
 
 
 @subroutine
@@ -204,39 +198,24 @@ class QpNumbers:
 
 
 class Decision(Record):
-    """What the QP decides.
+    """What the QP decides."""
 
-    Attributes:
-        z: see ``problem``.
-        tau: joint torques [N m] without friction.
-        tau_motors: those that the motors are told [N m].
-    """
-
-    z: Array30
-    tau: Array12
-    tau_motors: Array12
+    z: Array30  #: see ``problem``
+    tau: Array12  #: joint torques [N m] without friction
+    tau_motors: Array12  #: those that the motors are told [N m]
 
 
 class Workspace(Record):
-    """What a tick computes on the way to its decision; a tick takes nothing from the one before.
+    """What a tick computes on the way to its decision; a tick takes nothing from the one before."""
 
-    Attributes:
-        tasks, limits: rows of the built-in tasks and of the inequalities.
-        reduction: what follows from the unknowns u.
-        H, g: the cost u'Hu/2 + g'u; only the lower half of H is filled.
-        L: H = L L'.
-        u: the unknowns.
-        C, lower, upper: the inequalities in u.
-    """
-
-    tasks: TaskRows
-    limits: Limits
-    reduction: Reduction
-    H: Float[np.ndarray, "12 12"]
+    tasks: TaskRows  #: rows of the built-in tasks
+    limits: Limits  #: rows of the inequalities
+    reduction: Reduction  #: what follows from the unknowns u
+    H: Float[np.ndarray, "12 12"]  #: the cost u'Hu/2 + g'u; only the lower half is filled
     g: Array12
-    L: Float[np.ndarray, "12 12"]
-    u: Array12
-    C: Float[np.ndarray, "44 12"]
+    L: Float[np.ndarray, "12 12"]  #: H = L L'; only the lower half is filled
+    u: Array12  #: the unknowns
+    C: Float[np.ndarray, "44 12"]  #: lower <= C u <= upper are the inequalities
     lower: Float[np.ndarray, "44"]
     upper: Float[np.ndarray, "44"]
 

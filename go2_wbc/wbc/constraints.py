@@ -47,26 +47,19 @@ class Inequality(Source, ABC):
 
 
 class Limits(Record):
-    """The numbers of all inequalities, each row by what it names: a foot's force, a joint.
-
-    Attributes:
-        forces: five rows of each foot that stands, of its force f [N], see ``FrictionPyramid``.
-        forces_lower, forces_upper: lower <= forces f <= upper.
-        torques: rows of the torques [N m], of the accelerations of the base (6) and of the joint's
-            leg (3), and of the force of that leg's foot (3): the others do not act on this joint.
-        torques_offset: the torque is torques (a_b, a_leg, f) + offset.
-        torques_lower, torques_upper: what the motors give.
-        joints_lower, joints_upper: bounds of the joints' accelerations [rad/s^2].
-    """
+    """The numbers of all inequalities, each row by what it names: a foot's force, a joint."""
 
     forces: Float[np.ndarray, "4 5 3"]
-    forces_lower: Float[np.ndarray, "4 5"]
+    """Five rows of each foot that stands, of its force f [N], see ``FrictionPyramid``."""
+    forces_lower: Float[np.ndarray, "4 5"]  #: lower <= forces f <= upper
     forces_upper: Float[np.ndarray, "4 5"]
     torques: Float[np.ndarray, "12 12"]
-    torques_offset: Array12
-    torques_lower: Array12
-    torques_upper: Array12
-    joints_lower: Array12
+    """Rows of the torques [N m], of the accelerations of the base (6) and of the joint's leg (3),
+    and of the force of that leg's foot (3): the others do not act on this joint."""
+    torques_offset: Array12  #: the torque is torques (a_b, a_leg, f) + offset
+    torques_lower: Array12  #: what the motors give, at the least
+    torques_upper: Array12  #: at the most
+    joints_lower: Array12  #: bounds of the joints' accelerations [rad/s^2]
     joints_upper: Array12
 
 
@@ -286,8 +279,7 @@ class JointLimits(Inequality):
     the ground, is for the QP to tell.
 
     Attributes:
-        q_lower, q_upper: position limits [rad].
-        speed: speed limits [rad/s].
+        q_lower, q_upper, speed: limits of position [rad] and speed [rad/s].
         braking: deceleration [rad/s^2] that is always available.
         horizon: time [s] in which a bound on the velocity must be met.
     """

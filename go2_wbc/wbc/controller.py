@@ -39,14 +39,12 @@ from go2_wbc.wbc.constraints import (
     torque_map,
 )
 from go2_wbc.wbc.problem import ACCELERATION, FORCES, SIZE, Bounds, Problem, Rows, Source
-from go2_wbc.wbc.relaxation import solve_relaxed
-from go2_wbc.wbc.solvers import check_solver
+from go2_wbc.wbc.solvers import check_solver, solve_relaxed
 from go2_wbc.wbc.tasks import BuiltInTasks, Task
 
 GREATEST_EXTRA_WEIGHT = 1e4
 """Weight of a user's own task beyond which nothing is left of the others' accuracy."""
-BACKENDS = ("condensed", "full", "placo")
-"""Names of the back ends, the usual one first."""
+BACKENDS = ("condensed", "full", "placo")  #: Names of the back ends, the usual one first
 _IN_BODY = frozenset(BodyTarget.__dataclass_fields__)
 _IN_STATE = ("q", "v")
 _Z, _TAU, _MOTORS = (layout_of(Decision).slice(part) for part in ("z", "tau", "tau_motors"))
@@ -179,7 +177,6 @@ class WholeBodyController:
             raise ConfigError("the placo back end has tasks of its own and takes no extra ones")
 
     def __repr__(self) -> str:
-        """With which back end and solver, and how many tasks."""
         return (
             f"<WholeBodyController: {self.backend_name}, {self._solver}, {len(self.tasks)} tasks>"
         )

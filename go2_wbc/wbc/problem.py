@@ -28,8 +28,7 @@ from go2_wbc.robot.state import Snapshot
 
 ACCELERATION = slice(0, 18)
 """a in z: m/s^2 and rad/s^2 of the base in its own frame, then rad/s^2 of the joints."""
-FORCES = slice(18, 30)
-"""f in z: N in the world frame, foot by foot."""
+FORCES = slice(18, 30)  #: f in z: N in the world frame, foot by foot
 SIZE = 30
 T = TypeVar("T")
 
@@ -62,10 +61,8 @@ class Problem:
 
     Attributes:
         snapshot, reference: what the rows were made from.
-        tasks: stacked task rows, not weighted.
-        weights: (rows,) weight of each task row.
-        equalities: stacked equality rows.
-        bounds: stacked inequality rows.
+        tasks, weights: stacked task rows, not weighted, and (rows,) the weight of each.
+        equalities, bounds: stacked rows of equalities and inequalities.
         sources: who contributed rows, tasks first, then equalities, then bounds.
         counts: how many rows each of them contributed.
     """

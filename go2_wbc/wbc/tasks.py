@@ -25,19 +25,17 @@ from go2_wbc.records import V3, Array18, Record, packed
 from go2_wbc.reference import JOINTS, STANCE, SWING, Reference, Target
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.config import Gains, WbcConfig
-from go2_wbc.wbc.loads import plan_loads
 from go2_wbc.wbc.problem import SIZE, Rows, Source
+from go2_wbc.wbc.trajectory_loads import plan_loads
 
-LARGEST_ERROR = 3.0
-"""Orientation error [rad] beyond which its sine says little about it."""
+LARGEST_ERROR = 3.0  #: Orientation error [rad] beyond which its sine says little about it
 NO_ROTATION = 0.01
 """How far sine^2 + cosine^2 of a matrix's angle may be from 1, which they are for a rotation."""
 UNKNOWNS = 12
 """Three for each leg: the force of a foot that stands, else the accelerations of its joints."""
 TASK_ROWS = 18
 """Of all built-in tasks: three each for the trunk's place, its attitude, and for every leg."""
-LEG_ROWS = 6
-"""The first row of the first leg."""
+LEG_ROWS = 6  #: The first row of the first leg
 
 
 class Task(Source, ABC):
@@ -59,16 +57,12 @@ class TaskRows(Record):
 
     The first three are of the trunk's place, then three of its attitude, then three of each leg,
     by what the leg does. Those of a leg have 0 in the columns of the others.
-
-    Attributes:
-        A: columns: the base's acceleration (6), and three unknowns of each leg (12).
-        b: right sides.
-        weight: of each row.
     """
 
     A: Float[np.ndarray, "18 18"]
-    b: Array18
-    weight: Array18
+    """Columns: the base's acceleration (6), and three unknowns of each leg (12)."""
+    b: Array18  #: right side of each row
+    weight: Array18  #: of each row
 
     def of_decision(self, which: list[int], reference: Reference) -> Rows:
         """Some of the rows, as rows of the decision z."""
@@ -80,15 +74,10 @@ class TaskRows(Record):
 
 
 class BuiltIn(Task):
-    """A task of ours, whose rows one compiled function fills.
+    """A task of ours, whose rows one compiled function fills."""
 
-    Attributes:
-        fill: that function, of snapshot, target, task and rows.
-        part: which rows it fills, or those of the legs that do this.
-    """
-
-    fill: Callable[..., None]
-    part: range | int
+    fill: Callable[..., None]  #: that function, of snapshot, target, task and rows
+    part: range | int  #: which rows it fills, or those of the legs that do this
 
     def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
         """Rows A z = b of this task now; ``fill`` says which."""

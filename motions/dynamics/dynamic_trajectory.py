@@ -26,8 +26,7 @@ from go2_wbc.errors import MotionError
 from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.robot.model import RobotModel
 
-FORMAT = 1
-"""Version of the files; others are refused."""
+FORMAT = 1  #: Version of the files; others are refused
 BALANCING_FEET = 2
 """On so many feet or fewer the plan's own gains are worth keeping: on more, the whole-body
 controller balances by itself."""
@@ -88,8 +87,7 @@ class DynamicTrajectory:
         gains: (n, 12, 36) feedback of a state error (as Pinocchio's ``difference`` of planned and
             measured q, then of v) into torques: tau - gains @ error.
         p_feet: (n+1, 4, 3) centres of the feet [m].
-        iterations: of the solver, over all its starts.
-        cost: at the end.
+        iterations, cost: of the solver, over all its starts, and at the end.
         misses: what was asked at the phases' ends, and how far the plan is from it.
         lag: time [s] by which the plan is late against a motion that was written as a whole.
     """

@@ -34,48 +34,30 @@ STANDING_TURN = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """What is asked at one knot.
+    """What is asked at one knot."""
 
-    Attributes:
-        knot: which.
-        label: of the phase that ends there.
-        pose: (6,) trunk: place [m] and roll, pitch, yaw [rad]; or ``None``.
-        p_feet: (4, 3) places [m].
-        asked: (4,) feet whose places are asked.
-        lands: (4,) feet that touch down there.
-    """
-
-    knot: int
-    label: str
+    knot: int  #: which
+    label: str  #: of the phase that ends there
     pose: Float[np.ndarray, "6"] | None
-    p_feet: Float[np.ndarray, "4 3"]
-    asked: Bool[np.ndarray, "4"]
-    lands: Bool[np.ndarray, "4"]
+    """(6,) trunk: place [m] and roll, pitch, yaw [rad]; or ``None``."""
+    p_feet: Float[np.ndarray, "4 3"]  #: (4, 3) places [m]
+    asked: Bool[np.ndarray, "4"]  #: (4,) feet whose places are asked
+    lands: Bool[np.ndarray, "4"]  #: (4,) feet that touch down there
 
 
 @dataclass(frozen=True, slots=True)
 class Knots:
-    """A problem at its n + 1 knots; rows of what has n hold from one knot to the next.
+    """A problem at its n + 1 knots; rows of what has n hold from one knot to the next."""
 
-    Attributes:
-        times: (n+1,) [s].
-        stance: (n, 4) feet that stand.
-        p_stance: (n, 4, 3) where those that stand do [m].
-        goals: what the phases ask, by knots.
-        clearance: (n+1, 4) least height [m] of each foot's centre.
-        q, v: (n+1, 19), (n+1, 18) the first guess.
-        initial, final: the states at the ends.
-    """
-
-    times: Float[np.ndarray, " n1"]
-    stance: Bool[np.ndarray, "n 4"]
-    p_stance: Float[np.ndarray, "n 4 3"]
-    goals: tuple[Goal, ...]
-    clearance: Float[np.ndarray, "n1 4"]
-    q: Float[np.ndarray, "n1 19"]
-    v: Float[np.ndarray, "n1 18"]
-    initial: FullState
-    final: FullState
+    times: Float[np.ndarray, " n1"]  #: (n+1,) [s]
+    stance: Bool[np.ndarray, "n 4"]  #: (n, 4) feet that stand
+    p_stance: Float[np.ndarray, "n 4 3"]  #: (n, 4, 3) where those that stand do [m]
+    goals: tuple[Goal, ...]  #: what the phases ask, by knots
+    clearance: Float[np.ndarray, "n1 4"]  #: (n+1, 4) least height [m] of each foot's centre
+    q: Float[np.ndarray, "n1 19"]  #: (n+1, 19) the first guess
+    v: Float[np.ndarray, "n1 18"]  #: (n+1, 18) its velocities
+    initial: FullState  #: the state at the start
+    final: FullState  #: the state at the end
 
 
 @dataclass(frozen=True, slots=True)

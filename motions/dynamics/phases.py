@@ -4,12 +4,16 @@ Phases are what a solver is asked, not curves: between their ends everything fol
 All places are offsets from the standing pose at the start of the problem, along its axes (x ahead,
 y left, z up): those of the trunk from the base's place and attitude, those of a foot from where it
 stood. A later phase counts from the same pose, whatever has moved in between.
+
+Below are builders of jumps, hops, rears and lifts, each from standing to standing at rest.
+Their numbers are own choices that solve, and land in simulation; whoever wants others writes the
+phases. Durations are whole knots where nothing else decides them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -19,12 +23,12 @@ from jaxtyping import Float
 from go2_wbc.arguments import typed
 from go2_wbc.errors import TimelineError
 from go2_wbc.legs import LEGS, Leg
+from go2_wbc.robot.rotations import yaw_rotation
 from motions.arguments import is_number, positive
 
 BODY_COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 ALL_FEET = frozenset(LEGS)
-GRAVITY = 9.81
-"""[m/s^2]"""
+GRAVITY = 9.81  #: [m/s^2]
 KNOT_PERIOD = 0.02
 """Time [s] between knots, nearly: phases last whole numbers of them. Half of it costs two to four
 times the work, and the plans are no better (own experiments)."""
@@ -44,8 +48,7 @@ class Phase:
     """A span of time in which the same feet stand.
 
     Attributes:
-        duration: [s].
-        stance: the feet that stand.
+        duration, stance: [s], and the feet that stand.
         body: x, y, z [m], roll, pitch, yaw [rad] of the trunk at the end, as offsets from where the
             problem starts; ``None`` leaves it free, as in flight.
         feet: of feet that are in the air: where they are at the end [m], relative to where they
@@ -124,8 +127,7 @@ class Tolerance:
     """How far a plan may be from what was asked before it counts as none.
 
     Attributes:
-        position: [m]; 50 mm unless said otherwise.
-        angle: [rad]; 8 deg unless said otherwise.
+        position, angle: [m], 50 mm, and [rad], 8 deg unless said otherwise.
     """
 
     position: float = 0.05
@@ -209,3 +211,165 @@ def _leg(leg: object) -> Leg:
 
 def _are_numbers(values: tuple[object, ...], size: int) -> bool:
     return len(values) == size and all(map(is_number, values))
+
+
+FOOTPRINT = np.array([[0.1934, 0.142], [0.1934, -0.142], [-0.1934, 0.142], [-0.1934, -0.142]])
+"""Where the feet stand [m] around their middle, ahead and to the left: below the hips."""
+REAR_FEET, FRONT_FEET = frozenset({Leg.RL, Leg.RR}), frozenset({Leg.FL, Leg.FR})
+CROUCH, LEAN = -0.06, -0.02  #: Heights of the trunk [m] from which it jumps and rears
+GATHER, PUSH, LAND, RECOVER = 0.30, 0.20, 0.20, 0.30
+"""Times [s] for crouching, pushing off, taking the landing, and rising to stand."""
+LEAN_BACK = 0.40  #: Time [s] in which the weight goes to the rear feet before rearing
+PENDULUM_TIME = 0.175
+"""sqrt(h / g) [s] of a CoM 0.30 m above its feet, as which a trunk on two feet tips."""
+REAR_RISE = 0.03  #: By how much [m] the trunk's middle rises when rearing
+FARTHEST = {"x": 1.0, "y": 0.6, "yaw": math.pi, "height": 0.40}
+"""Beyond these a jump is refused unsolved [m, rad]; nearer ones may still have no plan."""
+LONGEST_FLIGHT = 1.0
+"""Time [s] in the air beyond which a jump is refused unsolved: twice that of the highest."""
+LOWEST = 0.02  #: Least height [m] of a jump's feet: less is a step
+_HERE = (0.0, 0.0, 0.0)
+_HOME = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def jump(
+    x: float = 0.0,
+    y: float = 0.0,
+    yaw: float = 0.0,
+    height: float = 0.15,
+    *,
+    flight: float | None = None,
+    footprint: Float[np.ndarray, "4 2"] = FOOTPRINT,
+) -> tuple[Phase, ...]:
+    """A jump ``x``, ``y`` [m] and ``yaw`` [rad] away, its feet ``height`` [m] high at the top.
+
+    ``flight`` is the time in the air [s], in whole knots, by default what a fall from ``height``
+    takes, so the trunk rises by that much; in less, the legs are drawn up for the rest.
+    ``footprint``: where the feet stand around their middle [m].
+
+    Raises:
+        TimelineError: for what no Go2 can jump.
+    """
+    for name, value in (("x", x), ("y", y), ("height", height)):
+        _require(f"a jump's {name}", value, -FARTHEST[name], FARTHEST[name])
+    _require_angle("a jump's yaw", yaw, -FARTHEST["yaw"], FARTHEST["yaw"])
+    _require("a jump's height", height, LOWEST, FARTHEST["height"])
+    half = _half_flight(height)
+    if flight is not None:
+        _require("a jump's time in the air", flight, 2.0 * KNOT_PERIOD, LONGEST_FLIGHT)
+        half = whole_knots(0.5 * flight)
+    return (
+        Phase(GATHER, body=_at(z=CROUCH), label="crouch"),
+        Phase(PUSH, label="push"),
+        Phase(half, frozenset(), feet=_moved(footprint, 0.5, (x, y, yaw), height), label="rise"),
+        Phase(half, frozenset(), feet=_moved(footprint, 1.0, (x, y, yaw), 0.0), label="fall"),
+        Phase(LAND, label="land"),
+        Phase(RECOVER, body=(x, y, 0.0, 0.0, 0.0, yaw), label="stand"),
+    )
+
+
+def hop(times: int = 3, period: float = 0.5, height: float = 0.05) -> tuple[Phase, ...]:
+    """Hops in place, ``height`` [m] high; the feet touch down once a ``period`` [s].
+
+    Raises:
+        TimelineError: for no hop, or a period that leaves no time on the ground.
+    """
+    if isinstance(times, bool) or not isinstance(times, int) or not 1 <= times <= 10:
+        raise TimelineError(f"hops must be a whole number from 1 to 10, got {times!r}")
+    _require("a hop's height", height, LOWEST, FARTHEST["height"])
+    half = _half_flight(height)
+    _require("the period of hops", period, 2.0 * half + PUSH, 5.0)
+    up, down = (_moved(FOOTPRINT, 1.0, (0.0, 0.0, 0.0), z) for z in (height, 0.0))
+    phases = [Phase(GATHER, body=_at(z=CROUCH), label="crouch")]
+    for count in range(1, times + 1):
+        ground = PUSH if count == 1 else period - 2.0 * half
+        phases += [
+            Phase(ground, label=f"push {count}"),
+            Phase(half, frozenset(), feet=up, label=f"rise {count}"),
+            Phase(half, frozenset(), feet=down, label=f"fall {count}"),
+        ]
+    return (*phases, Phase(LAND, label="land"), Phase(RECOVER, body=_HOME, label="stand"))
+
+
+def rear(pitch: float = math.radians(-25.0), hold: float = 0.6) -> tuple[Phase, ...]:
+    """Rears up on the rear feet to ``pitch`` [rad], negative is front up, and comes down again.
+
+    The trunk goes up and back like a pendulum on its head, so that it returns by itself: the longer
+    the front feet are to be off the ground (``hold`` [s]), the nearer it comes to above the rear
+    feet.
+
+    Raises:
+        TimelineError: for a pitch or time that the robot cannot do.
+    """
+    _require_angle("the pitch of rearing", pitch, math.radians(-60.0), math.radians(-5.0))
+    _require("the time of rearing", hold, 0.2, 1.0)
+    half = whole_knots(0.5 * hold)
+    back = float(FOOTPRINT[Leg.RL, 0]) * (1.0 - 1.0 / math.cosh(half / PENDULUM_TIME))
+    return (
+        Phase(LEAN_BACK, body=_at(z=LEAN), label="lean"),
+        Phase(PUSH, label="push"),
+        Phase(half, REAR_FEET, body=(back, 0.0, REAR_RISE, 0.0, pitch, 0.0), label="rear up"),
+        Phase(half, REAR_FEET, feet=dict.fromkeys(FRONT_FEET, _HERE), label="come down"),
+        Phase(LAND, label="land"),
+        Phase(RECOVER, body=_HOME, label="stand"),
+    )
+
+
+def lift(
+    legs: Collection[Leg] = (Leg.FL, Leg.RR), hold: float = 0.35, height: float = 0.06
+) -> tuple[Phase, ...]:
+    """Lifts one foot or two ``height`` [m] for ``hold`` seconds, puts them where they stood.
+
+    Raises:
+        TimelineError: for more legs, or a time or height that the robot cannot do.
+    """
+    if not 1 <= len(set(legs)) <= 2:
+        raise TimelineError(f"lift one or two legs, got {len(set(legs))}; with all four, jump")
+    _require("the time of lifting", hold, 0.1, 1.0)
+    _require("the height of lifting", height, LOWEST, 0.15)
+    stance, half = ALL_FEET - frozenset(legs), 0.5 * hold
+    up: Mapping[Leg, tuple[float, float, float]] = dict.fromkeys(legs, (0.0, 0.0, height))
+    return (
+        Phase(LEAN_BACK, label="shift"),
+        Phase(half, stance, feet=up, label="lift"),
+        Phase(half, stance, feet=dict.fromkeys(legs, _HERE), label="lower"),
+        Phase(LAND, label="land"),
+        Phase(RECOVER, body=_HOME, label="stand"),
+    )
+
+
+def _at(z: float) -> tuple[float, float, float, float, float, float]:
+    return 0.0, 0.0, z, 0.0, 0.0, 0.0
+
+
+def _half_flight(height: float) -> float:
+    """Time [s] to fall from ``height``, in whole knots."""
+    return whole_knots(math.sqrt(2.0 * height / GRAVITY))
+
+
+def _moved(
+    footprint: Float[np.ndarray, "4 2"], share: float, way: tuple[float, float, float], z: float
+) -> dict[Leg, tuple[float, float, float]]:
+    """Shifts of the feet after ``share`` of the way x, y [m], yaw [rad], at height ``z``."""
+    x, y, yaw = (share * part for part in way)
+    moved = footprint @ yaw_rotation(yaw)[:2, :2].T - footprint + [x, y]
+    return {leg: (float(moved[leg, 0]), float(moved[leg, 1]), z) for leg in LEGS}
+
+
+def _require_angle(what: str, angle: float, least: float, greatest: float) -> None:
+    """As ``_require``, with what may have been meant: degrees, or the other sign."""
+    if is_number(angle) and not least <= angle <= greatest:
+        degrees = math.radians(angle)
+        meant = {f"deg({angle:g})": degrees, f"{-angle:g}": -angle, f"-deg({angle:g})": -degrees}
+        for text, value in meant.items():
+            if least <= value <= greatest:
+                raise TimelineError(
+                    f"{what} must be from {least:.3g} to {greatest:.3g} rad, got {angle!r}: did "
+                    f"you mean {text}?"
+                )
+    _require(what, angle, least, greatest)
+
+
+def _require(what: str, value: float, least: float, greatest: float) -> None:
+    if not (is_number(value) and least <= value <= greatest):
+        raise TimelineError(f"{what} must be from {least:.3g} to {greatest:.3g}, got {value!r}")

@@ -17,8 +17,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, ranged
 from motions.dynamics.dynamic_trajectory import DynamicTrajectory, feet_at
 
-SOFT = 0.1
-"""Share of the costs with which a start begins; see ``Weights.softened``."""
+SOFT = 0.1  #: Share of the costs with which a start begins; see ``Weights.softened``
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,36 +60,23 @@ class PlanLimits:
 
 @dataclass(frozen=True, slots=True)
 class Weights:
-    """Costs per squared unit and second, or at a knot where that is said (own experiments).
+    """Costs per squared unit and second, or at a knot where that is said (own experiments)."""
 
-    Attributes:
-        torque: [1/(N m)^2], of the difference from standing.
-        friction: of forces outside the cone or above ``force_max`` [1/N^2].
-        joint_range, joint_speed: beyond the limits [1/rad^2], [s^2/rad^2].
-        ground: of a foot or knee below its height [1/m^2].
-        clearance: of a foot below its clearance [1/m^2].
-        foot_place, foot_speed: of a foot at touchdown or in its place, at one knot.
-        trunk: of the trunk at the end of a phase [1/m^2, 1/rad^2], at one knot.
-        end: of the last state, at one knot.
-        posture: of joints against the path of the first guess [1/rad^2].
-        speed: of all velocities.
-        track: of the trunk against the path of the first guess [1/m^2, 1/rad^2]: nothing, unless
-            that path is what is asked.
-    """
-
-    torque: float = 1e-3
-    friction: float = 1.0
-    joint_range: float = 2e3
-    joint_speed: float = 50.0
-    ground: float = 1e4
-    clearance: float = 2e4
-    foot_place: float = 2e4
-    foot_speed: float = 50.0
-    trunk: float = 2e3
-    end: float = 1e3
-    posture: float = 0.1
-    speed: float = 0.01
+    torque: float = 1e-3  #: [1/(N m)^2], of the difference from standing
+    friction: float = 1.0  #: of forces outside the cone or above ``force_max`` [1/N^2]
+    joint_range: float = 2e3  #: beyond the limits [1/rad^2]
+    joint_speed: float = 50.0  #: likewise [s^2/rad^2]
+    ground: float = 1e4  #: of a foot or knee below its height [1/m^2]
+    clearance: float = 2e4  #: of a foot below its clearance [1/m^2]
+    foot_place: float = 2e4  #: of a foot at touchdown or in its place, at one knot
+    foot_speed: float = 50.0  #: likewise
+    trunk: float = 2e3  #: of the trunk at the end of a phase [1/m^2, 1/rad^2], at one knot
+    end: float = 1e3  #: of the last state, at one knot
+    posture: float = 0.1  #: of joints against the path of the first guess [1/rad^2]
+    speed: float = 0.01  #: of all velocities
     track: float = 0.0
+    """Of the trunk against the path of the first guess [1/m^2, 1/rad^2]: nothing, unless that path
+    is what is asked."""
 
     def softened(self) -> Weights:
         """The same with everything but effort at a tenth, for a rough guess.
@@ -118,8 +104,7 @@ class Reading:
         value: the worst.
         limit: what it must not exceed, at least 0.
         unit: of both.
-        subject: whose it is.
-        time: when [s].
+        subject, time: whose it is, and when [s].
     """
 
     name: str
@@ -141,20 +126,13 @@ class Reading:
         )
 
 
-DEFECT = 1e-3
-"""What is left of the equations of motion [N, N m], at most."""
-FRICTION = 0.55
-"""Tangential over normal force."""
-PULL = 1.0
-"""Of the ground [N]."""
-PENETRATION = 0.005
-"""Of a foot in the air into the ground [m]."""
-SLIP = 0.02
-"""Of a standing foot, from where it touched down [m]."""
-TOUCHDOWN = 1.0
-"""Speed of a foot [m/s]."""
-ROTATION = 0.2
-"""Difference [rad] between the integrated rate and the change of attitude."""
+DEFECT = 1e-3  #: What is left of the equations of motion [N, N m], at most
+FRICTION = 0.55  #: Tangential over normal force
+PULL = 1.0  #: Of the ground [N]
+PENETRATION = 0.005  #: Of a foot in the air into the ground [m]
+SLIP = 0.02  #: Of a standing foot, from where it touched down [m]
+TOUCHDOWN = 1.0  #: Speed of a foot [m/s]
+ROTATION = 0.2  #: Difference [rad] between the integrated rate and the change of attitude
 
 
 def audit(plan: DynamicTrajectory, model: RobotModel) -> tuple[Reading, ...]:

@@ -23,8 +23,7 @@ from go2_wbc.robot.model import RobotModel
 from motions.dynamics.dynamic_trajectory import DynamicTrajectory
 from motions.dynamics.phases import PhaseProblem, Progress, Tolerance
 from motions.dynamics.plan_audit import PlanLimits
-from motions.dynamics.projection import PlanTarget, nearest
-from motions.dynamics.solver import accept, solve
+from motions.dynamics.solver import PlanTarget, accept, nearest, solve
 
 _log = logging.getLogger(__name__)
 _PACKAGES = ("crocoddyl", "pin")
@@ -121,7 +120,7 @@ def _read_failure(path: Path) -> PlanNotFound | None:
 
 def plan_folder() -> Path:
     """Where solved plans are kept."""
-    from go2_wbc.kept_code import cache_root
+    from go2_wbc.machine_code import cache_root
 
     return cache_root() / "plans"
 

@@ -40,7 +40,7 @@ from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.description import RobotDescription
 from go2_wbc.robot.model import RobotModel
 from motions.batch_kinematics import attitudes
-from motions.feasibility.case import Case
+from motions.feasibility.forces import Case
 from motions.feasibility.report import Series
 from motions.plan.trajectory import Trajectory
 
@@ -48,8 +48,7 @@ STRIDE = 4
 """Every fourth sample is looked at, 25 a second: at 1 m/s a link moves 4 cm between two of them."""
 SLACK = 1e-4
 """What a distance [m] may be wrong: GJK and EPA stop within 1e-6 of it, relative or in metres."""
-TRUNK_JOINT = 1
-"""Pinocchio's number of the base; those of hip, thigh and calf of every leg follow."""
+TRUNK_JOINT = 1  #: Pinocchio's number of the base; those of hip, thigh and calf of every leg follow
 PARTS = ("hip", "thigh", "calf")
 FAR = 0.05
 """Height [m] of a link's box above which its hull is not looked at: far from every limit."""
@@ -66,7 +65,6 @@ class SelfCollision:
     """
 
     def __init__(self, model: RobotModel) -> None:
-        """Take the convex bodies of ``model``; see ``geometry_of``."""
         self._model = model.pin_model
         self._data = self._model.createData()
         self.geometry = geometry_of(model.description)
@@ -122,8 +120,8 @@ def self_distance(case: Case, collision: SelfCollision) -> Series:
     found = collision.nearest_along(q)
     values = np.array([[distance] for distance, _ in found])
     worst = found[int(np.argmin(values))][1]
-    what = ("self-collision", "m", (worst,), case.path.times[rows], values)
-    return Series.against(*what, case.limits.self_distance, is_floor=True)
+    what, times = ("self-collision", "m", (worst,), values), case.path.times[rows]
+    return case.series(*what, case.limits.self_distance, is_floor=True, times=times)
 
 
 def _lever_arms(model: pin.Model, body: pin.GeometryObject) -> Float[np.ndarray, "12"]:
@@ -179,19 +177,12 @@ def _geometry(description: RobotDescription, _written: tuple[int, ...]) -> pin.G
 
 @dataclass(frozen=True, slots=True)
 class LinkHull:
-    """The hull of one link.
+    """The hull of one link."""
 
-    Attributes:
-        name: "trunk", or leg and part.
-        joint: Pinocchio's number of the joint that carries it.
-        corners: (k, 3) in that joint's frame [m].
-        box: (8, 3) corners of the box around them.
-    """
-
-    name: str
-    joint: int
-    corners: Float[np.ndarray, "k 3"]
-    box: Float[np.ndarray, "8 3"]
+    name: str  #: "trunk", or leg and part
+    joint: int  #: Pinocchio's number of the joint that carries it
+    corners: Float[np.ndarray, "k 3"]  #: (k, 3) in that joint's frame [m]
+    box: Float[np.ndarray, "8 3"]  #: (8, 3) corners of the box around them [m]
 
     @staticmethod
     def of(joint: int, points: Float[np.ndarray, "m 3"]) -> LinkHull:

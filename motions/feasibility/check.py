@@ -17,8 +17,8 @@ from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.recording import Recording
+from go2_wbc.robot.description import GO2, RobotProfile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import GO2, RobotProfile
 from go2_wbc.world import World
 from motions.authoring import Motion
 from motions.batch_kinematics import centres_of_mass
@@ -26,7 +26,7 @@ from motions.dynamics.phases import Progress
 from motions.feasibility import dynamic_spans, kinematic, tracking
 from motions.feasibility import forces as dynamics
 from motions.feasibility.bodies import SelfCollision, hulls_of, self_distance
-from motions.feasibility.case import Case, Forces
+from motions.feasibility.forces import Case, Forces
 from motions.feasibility.goal_errors import departure_measurements, departures
 from motions.feasibility.report import FeasibilityReport, Series
 from motions.language.timeline import Timeline
@@ -35,10 +35,9 @@ from motions.plan.compiled_plan import LEAST_FEET, CompiledPlan, Problem
 from motions.plan.timeline_compiler import Broken, compile_timeline
 from motions.plan.trajectory import Trajectory, trajectory_of
 from motions.registry import load_motion
-from motions.saved.plan_file import is_saved_plan, load_plan
+from motions.saved.files import is_saved_plan, load_plan
 
-BALANCE, WAY = "balance", "way of a foot"
-"""Problems of the compiler."""
+BALANCE, WAY = "balance", "way of a foot"  #: Problems of the compiler
 SLIDING = 0.17
 """Share of the slip that is allowed, from which on a force that lacks for a moment matters."""
 
@@ -48,8 +47,7 @@ class CheckedMotion:
     """A checked motion, with what the check worked out on its way.
 
     Attributes:
-        plan: what was checked.
-        report: what the check says.
+        plan, report: what was checked, and what the check says.
         path: the movement of the whole robot, in the frame of the motion.
         forces: contact forces and torques along it.
         robot: name of the profile of the robot that was judged.
@@ -155,8 +153,7 @@ class FeasibilityChecker:
     model of a control loop that runs.
 
     Attributes:
-        model: the robot.
-        world: in which motions are checked.
+        model, world: the robot, and in which world motions are checked.
     """
 
     @typed()
@@ -183,7 +180,6 @@ class FeasibilityChecker:
         self._hulls = hulls_of(self.model.description)
 
     def __repr__(self) -> str:
-        """Of which robot, in which world."""
         return f"<FeasibilityChecker: {self.model!r}, {self.world!r}>"
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -283,7 +279,9 @@ class FeasibilityChecker:
             carried = replace(case, path=_with_load(case.path, case.heavy))
         com, zero_moment_point = dynamics.support(carried)
         if carried is not case:  # the controller feels the load, and shifts the CoM back
-            com = _lesser(com, dynamics.support(case)[0])
+            own = dynamics.support(case)[0]
+            margins = np.minimum(com.margins, own.margins)
+            com = replace(com, values=np.minimum(com.values, own.values), margins=margins)
         lag, slip = dynamics.lagging(case), dynamics.slip(case)
         wrench, load = dynamics.contacts(case)
         is_off, slips = com.is_broken or lag.is_broken, slip.is_broken or lag.is_broken
@@ -293,7 +291,7 @@ class FeasibilityChecker:
         grip = dynamics.friction(case)
         landing_place, flat_landing, landing_speed = kinematic.landing(case)
         return [
-            *_missed(problems, limits),
+            *_missed(problems, case),
             kinematic.reach(case),
             kinematic.joint_position(case),
             self_distance(case, self._collision),
@@ -342,21 +340,15 @@ def check(
     return FeasibilityChecker(world=World.of(friction, payload, world)).check(motion)
 
 
-def _missed(problems: Sequence[Problem], limits: FeasibilityLimits) -> list[Series]:
+def _missed(problems: Sequence[Problem], case: Case) -> list[Series]:
     """What else than balance is not as written; a place that a foot nearly reaches is a warning."""
     found = [_failed(problem) for problem in problems if problem.check not in (BALANCE, WAY)]
     for problem in problems:
         if problem.check == WAY:
-            times, values = np.array([problem.time]), np.full((1, 1), problem.miss)
-            what = (WAY, "m", (problem.subject,), times, values, limits.reach)
-            found.append(Series.against(*what, tight=limits.reach))
+            values, reach = np.full((1, 1), problem.miss), case.limits.reach
+            what, times = (WAY, "m", (problem.subject,), values), np.array([problem.time])
+            found.append(case.series(*what, reach, tight=reach, times=times))
     return found
-
-
-def _lesser(one: Series, other: Series) -> Series:
-    """The lesser values of two series that may not fall below the same limits."""
-    values = np.minimum(one.values, other.values)
-    return replace(one, values=values, margins=np.minimum(one.margins, other.margins))
 
 
 def _failed(problem: Problem) -> Series:

@@ -37,13 +37,15 @@ speed dJ/dt v / b, and as the plan's feet rest, dJ/dt v = -J a. Fast rocking mak
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from go2_wbc.brief import brief
 from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.geometry import support_margins
+from go2_wbc.legs import JOINT_NAMES, LEGS
 from go2_wbc.records import packed
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
@@ -60,10 +62,65 @@ from go2_wbc.wbc.trajectory_loads import (
 )
 from go2_wbc.world import World
 from motions.batch_kinematics import attitudes, turned, zero_moment_points
-from motions.feasibility.case import FEET, JOINTS, Case, Forces
 from motions.feasibility.report import Series
 from motions.plan.trajectory import Trajectory
 from motions.postures import NORMAL_FORCE_MAX
+
+JOINTS = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
+FEET = tuple(leg.name for leg in LEGS)
+
+
+@dataclass(frozen=True, slots=True)
+class Forces:
+    """What the ground and the motors must give."""
+
+    contact: Float[np.ndarray, "n 4 3"]
+    """(n, 4, 3) forces on the feet in the frame of the motion [N]."""
+    tau: Float[np.ndarray, "n 12"]  #: (n, 12) joint torques [N m]
+    missing: Float[np.ndarray, "n 2"]
+    """(n, 2) part of the force [N] and of the moment [N m] that the feet cannot give."""
+    zmp: Float[np.ndarray, "n 2"]  #: (n, 2) zero-moment point on the ground [m]
+    wrench: Float[np.ndarray, "n 6"]  #: (n, 6) what the trunk needs, in its frame [N, N m]
+    v_motors: Float[np.ndarray, "n 12"] | None = None
+    """(n, 12) joint speeds [rad/s] at which the torques are given; those of the path unless
+    said."""
+
+    __repr__ = brief
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A movement that is judged."""
+
+    path: Trajectory  #: the movement
+    forces: Forces  #: what it takes
+    model: RobotModel  #: the robot that it was planned for
+    heavy: RobotModel  #: the robot that does it, with the load of the world
+    world: World = World()  #: with the worst of what is uncertain
+    limits: FeasibilityLimits = FeasibilityLimits()  #: what must be kept
+
+    def series(
+        self,
+        check: str,
+        unit: str,
+        subjects: tuple[str, ...],
+        values: Float[np.ndarray, "n k"],
+        limits: Float[np.ndarray, "*some"] | float,
+        *,
+        is_floor: bool = False,
+        where: Bool[np.ndarray, "#n #k"] | bool = True,
+        tight: float = 0.0,
+        times: Float[np.ndarray, " n"] | None = None,
+    ) -> Series:
+        """Of values that may not exceed ``limits``, or fall below them; checked only ``where``.
+
+        They are those at ``times`` [s], by default at every sample of the path.
+        """
+        bounds = np.broadcast_to(limits, values.shape)
+        margins = np.where(where, values - bounds if is_floor else bounds - values, np.nan)
+        when = self.path.times if times is None else times
+        return Series(check, unit, subjects, when, values, bounds, margins, tight)
+
 
 SPREAD = 3
 """Samples, 30 ms, over which forces are averaged: with it torques and slips of jolts came out as in
@@ -78,13 +135,11 @@ PYRAMID = WbcConfig().friction
 DRY, VISCOUS, CREEP = 0.2, 0.1, 0.1
 """Friction of a joint: N m, N m s/rad, and the speed [rad/s] below which the dry part is less. As
 the simulated robot has it (``plant.mujoco.model.JointDynamics``)."""
-LOADED = 0.999
-"""Share of its load from which on a foot counts as standing fully: 1, less rounding."""
+LOADED = 0.999  #: Share of its load from which on a foot counts as standing fully: 1, less rounding
 PRESSED = 10.0
 """Normal force [N] from which on the friction of a foot matters; below, the quotient is noise and
 a slip moves nothing (own choice, 6 % of the weight)."""
-STILL = 1e-6
-"""Joint speed [rad/s] below which a motor drives nothing: more than rounding, 1e-15."""
+STILL = 1e-6  #: Joint speed [rad/s] below which a motor drives nothing: more than rounding, 1e-15
 NO_SUPPORT = 1.0
 """How far outside [m] of their support CoM and zero-moment point count when no foot stands."""
 _FEW = (2, 3)
@@ -92,10 +147,8 @@ TRUNK = ("trunk", "trunk turning")
 TIGHT_TORQUE, TIGHT_LOAD, TIGHT_FRICTION = 0.1, 10.0, 0.05
 """Margins below which a warning is due: share of the smallest torque limit, N and 1; own choice,
 about what separates a plan from its run in simulation."""
-TIGHT_SUPPORT, TIGHT_SLIP = 0.01, 0.003
-"""The same [m]."""
-FACETS = 16
-"""Of the cone."""
+TIGHT_SUPPORT, TIGHT_SLIP = 0.01, 0.003  #: The same [m]
+FACETS = 16  #: Of the cone
 NEAR_LIMIT = 0.8
 """Share of the limit up to which the controller's own share of the load is looked at, no better."""
 MOST_FRICTION = 1.5

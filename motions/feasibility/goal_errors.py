@@ -14,7 +14,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from motions.dynamics.dynamic_trajectory import feet_at
 from motions.dynamics.phases import PhaseProblem
-from motions.dynamics.projection import PlanTarget
+from motions.dynamics.solver import PlanTarget
 from motions.plan.compiled_plan import CompiledPlan, DynamicSpan, attitude_angles
 
 SUBJECTS = ("trunk", *FOOT_NAMES)
@@ -23,17 +23,11 @@ _Places = Float[np.ndarray, "n1 4 3"]
 
 @dataclass(frozen=True, slots=True)
 class Misses:
-    """Of trunk and feet, at k instants; nan where nothing was asked.
+    """Of trunk and feet, at k instants; nan where nothing was asked."""
 
-    Attributes:
-        times: (k,) after the start of the span [s].
-        away: (k, 5) distances [m].
-        turned: (k, 5) angles [rad]; of the trunk only.
-    """
-
-    times: Float[np.ndarray, " k"]
-    away: Float[np.ndarray, "k 5"]
-    turned: Float[np.ndarray, "k 5"]
+    times: Float[np.ndarray, " k"]  #: (k,) after the start of the span [s]
+    away: Float[np.ndarray, "k 5"]  #: (k, 5) distances [m]
+    turned: Float[np.ndarray, "k 5"]  #: (k, 5) angles [rad], of the trunk only
 
 
 def misses_of(span: DynamicSpan, places: _Places, model: RobotModel) -> Misses:
@@ -89,8 +83,7 @@ class Departure:
         place: greatest distance [m] of the trunk, or of a foot that lands, from what was written.
         subject: of what.
         place_time: when [s].
-        angle: greatest angle [rad] of the trunk from what was written.
-        angle_time: when [s].
+        angle, angle_time: greatest angle [rad] of the trunk from what was written, and when [s].
         lag: how late [s] the trunk is as a whole; below 0, early.
     """
 

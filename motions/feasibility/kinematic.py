@@ -19,7 +19,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from motions.batch_kinematics import attitudes, foot_centres
 from motions.feasibility.bodies import LinkHulls
-from motions.feasibility.case import FEET, JOINTS, Case
+from motions.feasibility.forces import FEET, JOINTS, Case
 from motions.feasibility.report import Series
 from motions.plan.trajectory import Trajectory
 from motions.postures import home_poses
@@ -31,8 +31,7 @@ LOW, FAST = 0.004, 0.45
 """Height [m] above its place at which a foot may meet the ground, as trunks lag by that, and speed
 [m/s] along it from which on it stays there: feet of 0.5 and 1.6 m/s with 19 mm to go landed 18 and
 more beside their places, 8 that had 15 to 44 mm to go at up to 0.4 m/s came to them."""
-PAIR = 2
-"""Standing feet over which a trunk can fall to its side."""
+PAIR = 2  #: Standing feet over which a trunk can fall to its side
 TIGHT_ANGLE, TIGHT_SPEED = 0.03, 0.1
 """Margins below which a warning is due: rad, and share of the least speed limit; own choice."""
 
@@ -248,7 +247,7 @@ def ends(case: Case, plan: MotionPlan) -> Series:
         values[3] = np.inf
     times, own = np.array([0.0, plan.duration]), np.repeat(np.eye(2, dtype=bool), 3, axis=1)
     table = np.tile(values, (2, 1))
-    series = Series.against("entry and exit", "m, rad", names, times, table, bounds, where=own)
+    series = case.series("entry and exit", "m, rad", names, table, bounds, where=own, times=times)
     if not (series.margins[-1, 3:] < 0.0).any():
         return series
     end = plan.exit.value

@@ -28,7 +28,7 @@ from textwrap import wrap
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from go2_wbc.brief import brief, counted, cut, inline_html
 from go2_wbc.errors import MotionInfeasible
@@ -40,17 +40,12 @@ FILE = Path(__file__).with_name("probability.json")
 
 @dataclass(frozen=True, slots=True)
 class Rise:
-    """The curve of one check.
-
-    Attributes:
-        unit: margin, in its own unit, up to which the curve is over the margin itself; above 0.
-        centre: ``asinh(margin / unit)`` with an even chance.
-        width: of the rise; above 0.
-    """
+    """The curve of one check."""
 
     unit: float
-    centre: float
-    width: float
+    """Margin, in its own unit, up to which the curve is over the margin itself; above 0."""
+    centre: float  #: ``asinh(margin / unit)`` with an even chance
+    width: float  #: of the rise, above 0
 
     def chance(self, margin: float) -> float:
         """The chance that a margin stands for."""
@@ -120,16 +115,13 @@ def logistic(x: float) -> float:
     return 0.5 * (1.0 + math.tanh(0.5 * x))
 
 
-NOISE = 1e-6
-"""A value below this is nothing but rounding, and is shown as 0."""
-SURE = 0.99
-"""A chance above this, or below 1 - this, is not told more exactly."""
+NOISE = 1e-6  #: A value below this is nothing but rounding, and is shown as 0
+SURE = 0.99  #: A chance above this, or below 1 - this, is not told more exactly
 SUMS = ("slip",)
 """Checks whose values add up: what was too much stays so, but is wrong only while it grows."""
 GROWTH = 5e-5
 """By how much [m] at least from one sample to the next: less is the creep of any movement."""
-STAYS = 1e-3
-"""m, rad; a motion that ends nearer than this to where it starts does not go anywhere."""
+STAYS = 1e-3  #: m, rad; a motion that ends nearer than this to where it starts does not go anywhere
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,11 +129,8 @@ class Finding:
     """The worst instant of one subject under one check; a negative ``margin`` breaks the limit.
 
     Attributes:
-        check: which limit.
-        time: when [s] it is worst.
-        subject: joint, foot or body part.
-        value, limit, margin: in ``unit``.
-        unit: of these numbers.
+        check, time, subject: which limit, when [s] it is worst, and joint, foot or body part.
+        value, limit, margin, unit: the numbers, and their unit.
         note: what else there is to say.
     """
 
@@ -155,7 +144,6 @@ class Finding:
     note: str = ""
 
     def __str__(self) -> str:
-        """One line for a person."""
         line = f"{self.check}: {self.subject} at {self.time:.2f} s"
         if np.isfinite(self.value):
             value = self.value if abs(self.value) >= NOISE else 0.0
@@ -188,25 +176,6 @@ class Series:
     note: str = ""
 
     __repr__ = brief
-
-    @staticmethod
-    def against(
-        check: str,
-        unit: str,
-        subjects: tuple[str, ...],
-        times: Float[np.ndarray, " n"],
-        values: Float[np.ndarray, "n k"],
-        limits: Float[np.ndarray, "*some"] | float,
-        *,
-        is_floor: bool = False,
-        where: Bool[np.ndarray, "#n #k"] | bool = True,
-        tight: float = 0.0,
-    ) -> Series:
-        """Of values that may not exceed ``limits``, or fall below them; checked only ``where``."""
-        bounds = np.broadcast_to(limits, values.shape)
-        left = values - bounds if is_floor else bounds - values
-        margins = np.where(where, left, np.nan)
-        return Series(check, unit, subjects, times, values, bounds, margins, tight)
 
     @property
     def is_broken(self) -> bool:
@@ -256,8 +225,7 @@ class FeasibilityReport:
     """Whether the robot can do a motion, and by how much.
 
     Attributes:
-        motion: its name.
-        duration: its length [s].
+        motion, duration: its name, and its length [s].
         series: every check over the whole motion, causes before what follows from them: what no
             joint angles can do, then what the joints and the ground forbid, then balance, then
             speed, then the forces.
@@ -284,7 +252,6 @@ class FeasibilityReport:
     _repr_html_ = inline_html
 
     def __repr__(self) -> str:
-        """The verdict."""
         verdict = "ok" if self.ok else f"not ok: {self.failures[0]}"
         chance = f"{self.duration:.1f} s, chance {_percent(self.probability)}"
         return cut(f"FeasibilityReport({self.motion!r}, {chance}, {verdict})")

@@ -25,8 +25,7 @@ from motions.language.timeline import Timeline
 
 _log = logging.getLogger(__name__)
 _ReportOf = Callable[[Timeline], FeasibilityReport | None]
-AIM = 0.9
-"""Least chance of what is suggested."""
+AIM = 0.9  #: Least chance of what is suggested
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +34,9 @@ class Suggestion:
 
     Attributes:
         kind: "tempo", "amplitude", "height", "shift time", "jump" or "tempo and amplitude".
-        call: what to append to the motion, as Python.
-        meaning: the same in words.
+        call, meaning: what to append to the motion, as Python and in words.
         change: how large it is, as a share of the largest of its kind that is tried.
-        motion: the changed motion.
-        report: what the check says of it.
+        motion, report: the changed motion, and what the check says of it.
     """
 
     kind: str
@@ -68,23 +65,15 @@ class Suggestion:
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
-    """One kind of change.
+    """One kind of change."""
 
-    Attributes:
-        name: see ``Suggestion.kind``.
-        ladder: numbers of steps that are tried, increasing.
-        calls: calls of one number each, in their order, by what that is for a number of steps.
-        meaning: in words, of ``steps`` and of how long it ``lasts`` [s] after them.
-        digits: to which the numbers are rounded.
-        finest: difference of two numbers of steps that is looked for.
-    """
-
-    name: str
-    ladder: Sequence[int]
+    name: str  #: see ``Suggestion.kind``
+    ladder: Sequence[int]  #: numbers of steps that are tried, increasing
     calls: Mapping[str, Callable[[int], float]]
-    meaning: str
-    digits: int = 2
-    finest: int = 1
+    """Calls of one number each, in their order, by what that is for a number of steps."""
+    meaning: str  #: in words, of ``steps`` and of how long it ``lasts`` [s] after them
+    digits: int = 2  #: to which the numbers are rounded
+    finest: int = 1  #: difference of two numbers of steps that is looked for
 
     def numbers(self, steps: int) -> dict[str, float]:
         """The calls' numbers, by their names."""
@@ -101,12 +90,9 @@ class _Kind:
         return line
 
 
-_RISE = (5, 10, 15, 20, 30, 40, 60, 80)
-"""mm; own choice: the trunk stands 0.29 m high."""
-_SHARES = (2, 5, 10, 15, 20, 30, 40, 50, 60, 70, 80, 90)
-"""Per cent."""
-_LONGER = (2, 5, 10, 20, 30, 40, 50, 75, 100, 150, 200, 300)
-"""Per cent."""
+_RISE = (5, 10, 15, 20, 30, 40, 60, 80)  #: mm; own choice: the trunk stands 0.29 m high
+_SHARES = (2, 5, 10, 15, 20, 30, 40, 50, 60, 70, 80, 90)  #: Per cent
+_LONGER = (2, 5, 10, 20, 30, 40, 50, 75, 100, 150, 200, 300)  #: Per cent
 
 
 def _longer(steps: int) -> float:

@@ -29,38 +29,26 @@ from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.world import World
-from motions.feasibility.case import Case
-from motions.feasibility.forces import (
-    TRUNK,
-    VISCOUS,
-    errors_of,
-    joint_friction,
-    lost,
-    passes_over_few,
-    state_at,
-)
+from motions.feasibility import forces
 from motions.feasibility.report import Series
 from motions.plan.trajectory import Trajectory
 
-TRIPOD = 3
-"""Standing feet, with one raised."""
+TRIPOD = 3  #: Standing feet, with one raised
 LOWEST, FALLEN = 0.1, 0.3
 """Least height [m] of a CoM, and a distance [m] from which on it has fallen."""
-EVERY = 5
-"""Samples between those at which the inertia is computed; it changes slowly."""
-RCOND = 0.05
-"""Of a leg's Jacobian: a leg that is nearly stretched turns no faster than this says."""
+EVERY = 5  #: Samples between those at which the inertia is computed; it changes slowly
+RCOND = 0.05  #: Of a leg's Jacobian: a leg that is nearly stretched turns no faster than this says
 
 
-def tracking(case: Case) -> Series:
+def tracking(case: forces.Case) -> Series:
     """How far the trunk is off its plan in all: m, rad; solved parts, played otherwise, count 0.
 
     In MuJoCo it was off by 1.05 to 1.3 times as much for friction (motions drawn for that alone).
     """
     taken, damping = resistance(case.path, case.heavy, case.world)
-    errors = errors_of(case.path, lost(case) + taken, damping)
+    errors = forces.errors_of(case.path, forces.lost(case) + taken, damping)
     most = np.array([case.limits.off, case.limits.off_angle])
-    return case.series("tracking", "m, rad", TRUNK, errors, most)
+    return case.series("tracking", "m, rad", forces.TRUNK, errors, most)
 
 
 def resistance(
@@ -76,10 +64,10 @@ def resistance(
     rows = np.unique(np.append(np.arange(0, count, EVERY), count - 1))
     v, a = motion.v[rows, 6:], motion.a[rows, 6:]
     fed = WbcConfig().joint_friction.torque
-    rest = joint_friction(v, world) - [fed(*both) for both in zip(v, a, strict=True)]
+    rest = forces.joint_friction(v, world) - [fed(*both) for both in zip(v, a, strict=True)]
     taken, damped = _taken(motion, rows, rest, model)
     columns = [np.interp(motion.times, motion.times[rows], column) for column in taken.T]
-    return np.column_stack(columns), world.joint_friction * VISCOUS * damped.mean(axis=0)
+    return np.column_stack(columns), world.joint_friction * forces.VISCOUS * damped.mean(axis=0)
 
 
 def _taken(
@@ -89,7 +77,7 @@ def _taken(
     model: RobotModel,
 ) -> tuple[Float[np.ndarray, "m 6"], Float[np.ndarray, "m 6"]]:
     """The acceleration, and by which damping a unit of viscous friction damps, at these samples."""
-    snapshots = [model.snapshot(state_at(motion, row)) for row in rows.tolist()]
+    snapshots = [model.snapshot(forces.state_at(motion, row)) for row in rows.tolist()]
     J = np.array([one.J_contacts for one in snapshots])
     follow = np.zeros((len(rows), 18, 6))
     follow[:, :6] = np.eye(6)
@@ -107,7 +95,7 @@ def _taken(
     return forth, np.diagonal(damping, axis1=1, axis2=2)
 
 
-def tipping(case: Case, zmp: Float[np.ndarray, " n"]) -> Series:
+def tipping(case: forces.Case, zmp: Float[np.ndarray, " n"]) -> Series:
     """How far the trunk falls over the edge of three feet [m], where they stand for long.
 
     Of motions that bounce and sway on three feet, drawn for that alone, 39 up to 5.1 mm did not
@@ -116,7 +104,7 @@ def tipping(case: Case, zmp: Float[np.ndarray, " n"]) -> Series:
     """
     motion = case.path
     is_asked = (motion.stance.sum(axis=1) == TRIPOD) & ~motion.is_dynamic
-    is_asked &= ~passes_over_few(motion, case.limits)
+    is_asked &= ~forces.passes_over_few(motion, case.limits)
     values = np.zeros((len(zmp), 1))
     if (zmp[is_asked] < 0.0).any():
         normal = np.maximum(case.forces.contact[:, :, 2].sum(axis=1), 0.0)

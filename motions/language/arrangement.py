@@ -31,8 +31,7 @@ from motions.language.timeline_data import LEAST_BEAT, SAME, BeatClock, Timeline
 
 SLOWEST, FASTEST = 1.0, 60.0 / LEAST_BEAT
 """Beats a minute of a tempo: own choice, nobody counts slower or faster."""
-SHORTEST = 0.1
-"""Time [s] that a repetition counts at the least against the longest motion."""
+SHORTEST = 0.1  #: Time [s] that a repetition counts at the least against the longest motion
 _TIMES = ("cursor", "last_start", "floor", "counted_from")
 
 

@@ -19,14 +19,13 @@ from go2_wbc.legs import LEGS, Leg
 from go2_wbc.motion_plan import Posture
 from motions import arguments
 from motions.arguments import positive, quantity
-from motions.dynamics import phase_builders as build
+from motions.dynamics import phases as build
 from motions.dynamics.phases import BODY_COORDINATES, Phase
 from motions.language.keys import PhaseKey, PostureKey
 from motions.language.timeline_data import SAME, BeatClock, TimelineData
 
 _Place = tuple[float, float, float]
-_LOW = (-0.03, 0.0, -0.09, 0.0, 0.1, 0.0)
-"""Trunk before it pounces [m, rad]."""
+_LOW = (-0.03, 0.0, -0.09, 0.0, 0.1, 0.0)  #: Trunk before it pounces [m, rad]
 
 
 class DynamicBlocks(TimelineData):

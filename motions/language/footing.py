@@ -17,25 +17,17 @@ from motions.language.timeline_data import SAME, TimelineData
 
 Times = Float[np.ndarray, " n"]
 
-SQUARE = 1e-3
-"""Distance [m] from its place below the hip within which a foot is in it."""
-_ROUND = 64.0
-"""1 / (u^3 (1 - u)^3) at u = 1/2: makes the height of a swing 1 in its middle."""
+SQUARE = 1e-3  #: Distance [m] from its place below the hip within which a foot is in it
+_ROUND = 64.0  #: 1 / (u^3 (1 - u)^3) at u = 1/2: makes the height of a swing 1 in its middle
 
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """Where the feet stand, or are on their way, at n instants.
+    """Where the feet stand, or are on their way, at n instants."""
 
-    Attributes:
-        p_feet: (n, 4, 3) their centres [m].
-        frames: (n, 3) x, y [m] and yaw [rad] of the frame of the four feet.
-        headings: (n, 3, 3) its attitude.
-    """
-
-    p_feet: Float[np.ndarray, "n 4 3"]
-    frames: Float[np.ndarray, "n 3"]
-    headings: Float[np.ndarray, "n 3 3"]
+    p_feet: Float[np.ndarray, "n 4 3"]  #: (n, 4, 3) their centres [m]
+    frames: Float[np.ndarray, "n 3"]  #: (n, 3) x, y [m] and yaw [rad] of the frame of the four feet
+    headings: Float[np.ndarray, "n 3 3"]  #: (n, 3, 3) its attitude
 
     def part(self, rows: slice) -> Ground:
         """Some of its instants."""

@@ -18,23 +18,18 @@ from go2_wbc.motion_plan import Posture
 from motions.arguments import is_number, word
 from motions.dynamics.phases import ALL_FEET, Phase, PhaseProblem, whole_knots
 
-NEAR = 1e-6
-"""How far an own easing may be from 0 at its start and from 1 at its end."""
+NEAR = 1e-6  #: How far an own easing may be from 0 at its start and from 1 at its end
 _EASES = {ease.value: ease for ease in Ease}
 _TRIED = np.linspace(0.0, 1.0, 101).tolist()
 
 
 @dataclass(frozen=True, slots=True)
 class OwnEase:
-    """Progress by an author's own function.
-
-    Attributes:
-        function: from the share of time that has passed, 0 to 1, to the share of the way.
-        is_reversed: whether it is gone through backwards: 1 - f(1 - s).
-    """
+    """Progress by an author's own function."""
 
     function: Callable[[float], float]
-    is_reversed: bool = False
+    """From the share of time that has passed, 0 to 1, to the share of the way."""
+    is_reversed: bool = False  #: whether it is gone through backwards: 1 - f(1 - s)
 
     def progress(self, s: float) -> tuple[float, float, float]:
         """As ``Ease.progress``; the derivatives are not known and count as 0."""
@@ -42,10 +37,8 @@ class OwnEase:
         return float(value), 0.0, 0.0
 
 
-Easing = Ease | OwnEase
-"""Checked ways to go."""
-EaseWord = Ease | OwnEase | str | Callable[[float], float]
-"""What an author may write for one."""
+Easing = Ease | OwnEase  #: Checked ways to go
+EaseWord = Ease | OwnEase | str | Callable[[float], float]  #: What an author may write for one
 _REVERSED: dict[Ease, Ease] = {Ease.IN: Ease.OUT, Ease.OUT: Ease.IN}
 
 
@@ -103,16 +96,12 @@ class Frame(Enum):
 
 @dataclass(frozen=True, slots=True)
 class LegTarget:
-    """Where a leg goes.
+    """Where a leg goes."""
 
-    Attributes:
-        frame: what ``values`` mean.
-        values: offset x, y, z [m] of the foot from where it stands, fixed to the ground or to the
-            trunk; or hip, thigh and calf angle [rad].
-    """
-
-    frame: Frame
+    frame: Frame  #: what ``values`` mean
     values: tuple[float, float, float]
+    """Offset x, y, z [m] of the foot from where it stands, fixed to the ground or to the trunk; or
+    hip, thigh and calf angle [rad]."""
 
     @property
     def is_on_ground(self) -> bool:
@@ -135,26 +124,19 @@ class LegTarget:
         return replace(self, values=(amplitude * x, amplitude * y, amplitude * z))
 
 
-ON_GROUND = LegTarget(Frame.GROUND, (0.0, 0.0, 0.0))
-"""The foot where it stands."""
+ON_GROUND = LegTarget(Frame.GROUND, (0.0, 0.0, 0.0))  #: The foot where it stands
 
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """One move of one track.
-
-    Attributes:
-        start, end: when [s].
-        ease: how it goes from the last goal to this one.
-    """
+    """One move of one track."""
 
     instants: ClassVar[tuple[str, ...]] = ("start", "end")
-    moves: ClassVar[str]
-    """What moves, in words."""
+    moves: ClassVar[str]  #: What moves, in words
 
-    start: float
-    end: float
-    ease: Easing
+    start: float  #: when [s]
+    end: float  #: when [s]
+    ease: Easing  #: how it goes from the last goal to this one
 
     @property
     def track(self) -> str:
@@ -213,15 +195,10 @@ class BodyKey(Key):
 
 @dataclass(frozen=True, slots=True)
 class BodyPathKey(BodyKey):
-    """The trunk moves along one channel through several offsets [m or rad], without a stop.
+    """The trunk moves along one channel through several offsets [m or rad], without a stop."""
 
-    Attributes:
-        through: offsets on the way to ``value``.
-        shares: shares of the time, between 0 and 1, at which they are passed.
-    """
-
-    through: tuple[float, ...]
-    shares: tuple[float, ...]
+    through: tuple[float, ...]  #: offsets on the way to ``value``
+    shares: tuple[float, ...]  #: shares of the time, between 0 and 1, at which they are passed
 
     def scaled(self, amplitude: float) -> Self:
         """Its offsets multiplied."""
@@ -259,40 +236,29 @@ class LegKey(Key):
 
 @dataclass(frozen=True, slots=True)
 class JointKey(LegKey):
-    """One joint of a leg moves to its angle in ``target``; the others stay as they are.
+    """One joint of a leg moves to its angle in ``target``; the others stay as they are."""
 
-    Attributes:
-        joint: which of the three.
-    """
-
-    joint: int
+    joint: int  #: which of the three
 
 
 @dataclass(frozen=True, slots=True)
 class StepKey(Key):
-    """A foot swings to a new place and stands there.
-
-    Attributes:
-        leg: whose foot.
-        place: x, y [m] and yaw [rad], in the frame of the four feet: its origin in their middle, x
-            along their heading. Of a single step, the way of the foot, after the frame has turned
-            by yaw with the foot on it; of a square one, the pose of the frame in which the foot
-            then stands below its hip.
-        height: of the foot [m] above its way, at most.
-        since: instant [s] whose frame of the feet it is; a foot in the air counts where it lands.
-        lead: the trunk follows from so long [s] before the swing until so long after it.
-        is_square: whether ``place`` is the pose of a frame.
-    """
+    """A foot swings to a new place and stands there."""
 
     instants: ClassVar[tuple[str, ...]] = ("start", "end", "since")
     moves: ClassVar[str] = "foot {0.leg.name}"
 
-    leg: Leg
+    leg: Leg  #: whose foot
     place: tuple[float, float, float]
-    height: float
+    """x, y [m] and yaw [rad], in the frame of the four feet: its origin in their middle, x along
+    their heading. Of a single step, the way of the foot, after the frame has turned by yaw with the
+    foot on it; of a square one, the pose of the frame in which the foot then stands below its
+    hip."""
+    height: float  #: of the foot [m] above its way, at most
     since: float
-    lead: float = 0.0
-    is_square: bool = False
+    """Instant [s] whose frame of the feet it is; a foot in the air counts where it lands."""
+    lead: float = 0.0  #: the trunk follows from so long [s] before the swing until so long after it
+    is_square: bool = False  #: whether ``place`` is the pose of a frame
 
     def slower(self, factor: float) -> Self:
         """The same key, all times multiplied."""
@@ -328,32 +294,23 @@ class FootHold(Mark):
 
 @dataclass(frozen=True, slots=True)
 class BalanceShift(Key):
-    """The trunk moves over the feet that stay when ``raised`` legs are in the air.
-
-    Attributes:
-        raised: these legs.
-        is_swaying: whether it is instead over those of the feet that stand while others step.
-    """
+    """The trunk moves over the feet that stay when ``raised`` legs are in the air."""
 
     moves: ClassVar[str] = "balance"
 
-    raised: frozenset[Leg]
+    raised: frozenset[Leg]  #: these legs
     is_swaying: bool = False
+    """Whether it is instead over those of the feet that stand while others step."""
 
 
 @dataclass(frozen=True, slots=True)
 class PhaseKey(Key):
-    """The whole robot goes through phases, from standing at home to standing at home.
-
-    Attributes:
-        phases: one after the other; together they last from ``start`` to ``end``.
-        is_open: whether ``Timeline.phase`` may still add one.
-    """
+    """The whole robot goes through phases, from standing at home to standing at home."""
 
     moves: ClassVar[str] = "the whole robot"
 
-    phases: tuple[Phase, ...]
-    is_open: bool
+    phases: tuple[Phase, ...]  #: one after the other; together they last from ``start`` to ``end``
+    is_open: bool  #: whether ``Timeline.phase`` may still add one
 
     @property
     def shift(self) -> Float[np.ndarray, "4 3"]:

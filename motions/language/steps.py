@@ -19,10 +19,8 @@ from motions.arguments import positive, quantity
 from motions.language.keys import BalanceShift, Key, StepKey
 from motions.language.timeline_data import SAME, TimelineData
 
-STEP_HEIGHT = 0.05
-"""Height [m] of a foot above the ground in the middle of a step: own choice."""
-FARTHEST_WALK = 20.0
-"""A walk that is longer [m] is a mistake in units: it would take five minutes."""
+STEP_HEIGHT = 0.05  #: Height [m] of a foot above the ground in the middle of a step: own choice
+FARTHEST_WALK = 20.0  #: A walk that is longer [m] is a mistake in units: it would take five minutes
 POINTS = 65
 """Poses between two points of a way: own choice, a millimetre apart at the end of a stride."""
 HALVES, THIRDS = (0.25, 0.5, 1.0, 2.0, 4.0), (1.0 / 3.0, 2.0 / 3.0, 3.0)
@@ -31,33 +29,22 @@ HALVES, THIRDS = (0.25, 0.5, 1.0, 2.0, 4.0), (1.0 / 3.0, 2.0 / 3.0, 3.0)
 
 @dataclass(frozen=True, slots=True)
 class StepGait:
-    """In which order feet step, and how far and fast. Own choice, by the check and in simulation.
-
-    Attributes:
-        offsets: of FL, FR, RL, RR: shares of a round at which their swings start.
-        period: time [s] of a round, unless it is asked for faster or slower.
-        least_period, most_period: of the fastest and of the slowest round [s].
-        duty: share of a round in which each foot stands.
-        stride: longest way [m] ahead in a round.
-        side_stride: longest way [m] aside.
-        turn: largest turn [rad] in a round.
-        rest: time [s] on four feet before the first step and after the last one, at least: the
-            trunk moves over the feet that will stand.
-        height: of the feet [m] in the middle of a step.
-        landings: how often in a round feet land.
-    """
+    """In which order feet step, and how far and fast: own choice, checked and in simulation."""
 
     offsets: tuple[float, float, float, float]
-    period: float
-    least_period: float
-    most_period: float
-    duty: float
-    stride: float
-    side_stride: float
-    turn: float
+    """Of FL, FR, RL, RR: shares of a round at which their swings start."""
+    period: float  #: time [s] of a round, unless it is asked for faster or slower
+    least_period: float  #: of the fastest round [s]
+    most_period: float  #: of the slowest round [s]
+    duty: float  #: share of a round in which each foot stands
+    stride: float  #: longest way [m] ahead in a round
+    side_stride: float  #: longest way [m] aside
+    turn: float  #: largest turn [rad] in a round
     rest: float
-    height: float
-    landings: int
+    """Time [s] on four feet before the first step and after the last one, at least: the trunk moves
+    over the feet that will stand."""
+    height: float  #: of the feet [m] in the middle of a step
+    landings: int  #: how often in a round feet land
 
     @property
     def last(self) -> float:
@@ -99,13 +86,10 @@ across, with 40 ms on four feet between them."""
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """Where the frame of the feet goes, seen from where it starts.
-
-    Attributes:
-        poses: (k, 3) x, y [m] and yaw [rad] along the way, close to each other.
-    """
+    """Where the frame of the feet goes, seen from where it starts."""
 
     poses: Float[np.ndarray, "k 3"]
+    """(k, 3) x, y [m] and yaw [rad] along the way, close to each other."""
 
     def efforts(self, gait: StepGait) -> Float[np.ndarray, " k"]:
         """Rounds of ``gait`` that it takes to get to each pose."""
@@ -130,19 +114,12 @@ class Way:
 
 @dataclass(frozen=True, slots=True)
 class Rhythm:
-    """When the steps of a stretch are.
+    """When the steps of a stretch are."""
 
-    Attributes:
-        rounds: how many.
-        period: of each [s].
-        before: time [s] on four feet before the first step.
-        over: of all of it [s].
-    """
-
-    rounds: int
-    period: float
-    before: float
-    over: float
+    rounds: int  #: how many
+    period: float  #: [s] of each
+    before: float  #: time [s] on four feet before the first step
+    over: float  #: time [s] of all of it
 
 
 def rhythm_for(gait: StepGait, rounds: int, beat: float | None) -> Rhythm:

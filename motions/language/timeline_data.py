@@ -20,23 +20,18 @@ from motions.arguments import is_number, positive
 from motions.dynamics.phases import Tolerance
 from motions.language.keys import BODY_CHANNELS, BalanceShift, BodyKey, Key, LegKey
 
-SAME = 1e-9
-"""Times this close [s] are the same: absorbs rounding of sums."""
+SAME = 1e-9  #: Times this close [s] are the same: absorbs rounding of sums
 LEAST_BEAT = 0.05
 """Beats that follow closer [s] are no ruler: own choice, 1200 a minute; nobody counts so fast."""
-MOST_BEATS = 10_000
-"""Nor are more than so many: own choice, an hour at 160 a minute."""
+MOST_BEATS = 10_000  #: Nor are more than so many: own choice, an hour at 160 a minute
 
 
 @dataclass(frozen=True, slots=True)
 class BeatClock:
-    """Counts in beats: straight between the instants of two, and on as the last two are apart.
-
-    Attributes:
-        instants: when [s] after the start of the motion beats 0, 1, 2 ... are; two or more.
-    """
+    """Counts in beats: straight between the instants of two, and on as the last two are apart."""
 
     instants: tuple[float, ...] = (0.0, 1.0)
+    """When [s] after the start of the motion beats 0, 1, 2 ... are; two or more."""
 
     @staticmethod
     def steady(interval: float) -> BeatClock:
@@ -125,9 +120,7 @@ class TimelineData:
     """An authored motion.
 
     Attributes:
-        entry: posture in which it starts.
-        exit: posture in which it ends.
-        name: what to call it.
+        entry, exit, name: postures in which it starts and ends, and what to call it.
         balance: whether the body moves over the standing feet before one is raised.
         shift_time: how long [s] that takes, before a tempo is set.
         shift_beats: how many beats it takes with a tempo; 0 without one.
@@ -137,8 +130,7 @@ class TimelineData:
             nearest motion that it can.
         tolerance: how far what is solved may be from what is asked.
         longest: how long [s] it may become: a slip of the pen is no motion of a day.
-        keys: what was written so far.
-        cursor: when [s] the next call starts.
+        keys, cursor: what was written so far, and when [s] the next call starts.
         clock: what one unit of ``over`` lasts, here and later.
         last_start: when [s] the last call's move starts.
         floor: the cursor does not fall behind this time [s] after ``also``.
@@ -164,7 +156,6 @@ class TimelineData:
     _repr_html_ = inline_html
 
     def __repr__(self) -> str:
-        """Its name, length and ends."""
         ends = f"{self.entry.value} to {self.exit.value}"
         return f"Timeline({self.name!r}, {self.end:.2f} s, {len(self.keys)} moves, {ends})"
 

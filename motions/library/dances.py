@@ -8,10 +8,8 @@ from motions.library.paws import curtsy, lift_leg, salute, shake_paw, wave
 from motions.library.trunk import bow, content, push_ups
 from motions.library.walks import moonwalk, pirouette
 
-RADIUS = 0.035
-"""Radius [m] of the circle."""
-LEAN = deg(5.0)
-"""Angle [rad] by which the trunk leans inwards."""
+RADIUS = 0.035  #: Radius [m] of the circle
+LEAN = deg(5.0)  #: Angle [rad] by which the trunk leans inwards
 
 
 @motion
@@ -80,10 +78,8 @@ def wiggle(times: Annotated[int, Range(1, 10)] = 4) -> Timeline:
     return line.home(over=0.6)
 
 
-HEAD = 0.25
-"""Distance [m] from the middle of the trunk to the point ahead that stays where it is."""
-SWING = deg(6.0)
-"""Angle [rad] by which the rump goes to either side."""
+HEAD = 0.25  #: Distance [m] from the middle of the trunk to the point ahead that stays where it is
+SWING = deg(6.0)  #: Angle [rad] by which the rump goes to either side
 
 
 @motion

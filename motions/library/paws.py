@@ -2,14 +2,13 @@
 
 from typing import Annotated
 
-from go2_wbc.robot.profile import find_profile
+from go2_wbc.robot.description import find_profile
 from motions import Choice, Range, Timeline, deg, motion
 
 Side = Annotated[str, Choice("left", "right")]
 
 
-THIGH, CALF = -1.05, -1.15
-"""Angles [rad] of the leg that waves."""
+THIGH, CALF = -1.05, -1.15  #: Angles [rad] of the leg that waves
 
 
 @motion
@@ -34,8 +33,7 @@ def wave(
     return line if side == "right" else line.mirror()
 
 
-HEIGHT = 0.64
-"""Height [m] above the ground at which the paw's centre is held by default."""
+HEIGHT = 0.64  #: Height [m] above the ground at which the paw's centre is held by default
 REACH, TAP = 0.177, 0.034
 """Distance [m] of the paw ahead of where it stood, and how much farther it taps."""
 FOLDED = (-0.10, -0.30, -2.0)

@@ -190,8 +190,7 @@ def _angles(points: int, rounds: int) -> list[float]:
     return [2.0 * math.pi * k / points for k in range(1, points * rounds + 1)]
 
 
-POINTS = 24
-"""Points of the heart that the nose passes."""
+POINTS = 24  #: Points of the heart that the nose passes
 WIDTH, HEIGHT = deg(7.0), deg(9.0)
 """Half of the heart's width in yaw and of its height in pitch [rad]."""
 

@@ -26,39 +26,28 @@ from motions.music.songs import RATE, Sound, checked_metre, read_sound
 HOP, WINDOW = 128, 512
 """Samples from one frame to the next (5.8 ms), and of a frame (23 ms): short, to tell when a note
 begins; librosa's defaults are 512 and 2048."""
-BANDS = 40
-"""Bands of pitch whose rises in loudness are added up."""
+BANDS = 40  #: Bands of pitch whose rises in loudness are added up
 LATENESS = 0.0061
 """How late [s] the beginning of a note is found, beyond librosa's own correction: mean of 71
 songs of ``songs``, the tuning seeds 0 to 59 and eleven click tracks; 0.5 ms from song to song."""
-LEAST_BEATS = 4
-"""A bar: fewer are no song."""
-SILENCE = 1e-4
-"""Amplitude, of 1, below which all is silent: the last step of 14 bits."""
-QUIET = 0.01
-"""Share of the greatest amplitude below which a song has not begun, or is over."""
-SLOWEST, FASTEST = 50.0, 210.0
-"""Tempi [beats/min] that are looked for."""
+LEAST_BEATS = 4  #: A bar: fewer are no song
+SILENCE = 1e-4  #: Amplitude, of 1, below which all is silent: the last step of 14 bits
+QUIET = 0.01  #: Share of the greatest amplitude below which a song has not begun, or is over
+SLOWEST, FASTEST = 50.0, 210.0  #: Tempi [beats/min] that are looked for
 USUAL_TEMPO, TEMPO_SPREAD = 120.0, 1.5
 """Where tempi are likely [beats/min], and how far [octaves]: librosa's mean; the spread was chosen
 on the tuning seeds, of which it finds 66 of 71 as they are counted, 3 by halves, 2 doubled."""
-MULTIPLES = 8
-"""How many beats later a song is still compared with itself."""
-CANDIDATES = 8
-"""Tempi that are tried."""
-TIGHTNESS = 300.0
-"""How little the tempo may change from beat to beat; librosa's default is 100."""
+MULTIPLES = 8  #: How many beats later a song is still compared with itself
+CANDIDATES = 8  #: Tempi that are tried
+TIGHTNESS = 300.0  #: How little the tempo may change from beat to beat; librosa's default is 100
 LEAST_AGREEMENT = 0.08
 """Mean correlation of a song with itself 1 to 8 beats later, below which it has no beat."""
 LEAST_RISE = 0.5
 """Rise in loudness [dB] at the mean beat, below which it is none: songs have 6 and more, a steady
 tone 0.02."""
-SNAP = 0.05
-"""How far [s] the loudest beginning of a note may be from a beat that it tells."""
-NEIGHBOURS = 8
-"""Beats before and after one that say with it where it is."""
-OUTLIER = 0.01
-"""Distance [s] from a straight line of beats from which on a note counts less."""
+SNAP = 0.05  #: How far [s] the loudest beginning of a note may be from a beat that it tells
+NEIGHBOURS = 8  #: Beats before and after one that say with it where it is
+OUTLIER = 0.01  #: Distance [s] from a straight line of beats from which on a note counts less
 
 Frames = Float[np.ndarray, " n"]
 Times = Float[np.ndarray, " k"]
@@ -274,10 +263,8 @@ HEARD = (4, 3, 6)
 one where nothing tells."""
 BAR_WINDOW, BAR_HOP = 2048, 512
 """Samples of a frame (93 ms), long enough to tell tones apart, and from one to the next."""
-BASS = slice(1, 15)
-"""Rows of the spectrum up to 150 Hz."""
-STROKE = 6
-"""Frames (0.14 s) after a beat in which its bass is looked for."""
+BASS = slice(1, 15)  #: Rows of the spectrum up to 150 Hz
+STROKE = 6  #: Frames (0.14 s) after a beat in which its bass is looked for
 
 PerBeat = Float[np.ndarray, " k"]
 

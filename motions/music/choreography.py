@@ -28,24 +28,16 @@ LEAD = 0.006
 back 7 ms late in the mean (241 accents), and a foot was on the ground 6 ms early (64)."""
 LONGEST = 180.0
 """Length [s] of the longest dance: it ends before a longer song. A run is kept for 4 minutes."""
-SHORTEST_PULSE = 0.55
-"""Least length [s] of a pulse: a move takes one. Own choice."""
-LEAST_PULSES = 4
-"""Fewer are no dance."""
-GET_READY = 0.3
-"""Time [s] from the start of the song before which no move starts."""
+SHORTEST_PULSE = 0.55  #: Least length [s] of a pulse: a move takes one. Own choice
+LEAST_PULSES = 4  #: Fewer are no dance
+GET_READY = 0.3  #: Time [s] from the start of the song before which no move starts
 MOVES_PER_SECOND = 20 / 30
 """Moves that a dance has at least, where the pulses allow it: 20 in half a minute."""
-SLACK = 2.0
-"""How many moves a dance may be behind that until its end; as many more are aimed for."""
-RECENT = 4
-"""Moves that are not chosen again to fill a gap, where there are others."""
-TRIPLE = 3
-"""Metre of a waltz."""
-UNEVEN = 0.6
-"""A pulse that comes sooner than this share of the usual after another is none."""
-ATTEMPTS = 12
-"""How often infeasible moves are replaced before the dance is given up."""
+SLACK = 2.0  #: How many moves a dance may be behind that until its end; as many more are aimed for
+RECENT = 4  #: Moves that are not chosen again to fill a gap, where there are others
+TRIPLE = 3  #: Metre of a waltz
+UNEVEN = 0.6  #: A pulse that comes sooner than this share of the usual after another is none
+ATTEMPTS = 12  #: How often infeasible moves are replaced before the dance is given up
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,13 +53,11 @@ class Dance:
     """A dance, written.
 
     Attributes:
-        timeline: the motion; it starts with the song.
-        moves: what is done, in order.
+        timeline, moves: the motion, which starts with the song, and what is done, in order.
         accents: what shall happen on the beats, by pulses of the dance.
         pulses: instants [s] of the pulses in the song; the first one is counted in, without an
             accent.
-        bar: pulses of a bar.
-        downbeat: number of the first pulse that begins one.
+        bar, downbeat: pulses of a bar, and number of the first pulse that begins one.
     """
 
     timeline: Timeline
@@ -90,17 +80,11 @@ class Dance:
 
 @dataclass(frozen=True, slots=True)
 class Pulses:
-    """The instants of a song on which a dance has its accents.
+    """The instants of a song on which a dance has its accents."""
 
-    Attributes:
-        times: instants [s].
-        bar: pulses of a bar.
-        downbeat: number of the first pulse that begins one.
-    """
-
-    times: Float[np.ndarray, " n"]
-    bar: int
-    downbeat: int
+    times: Float[np.ndarray, " n"]  #: instants [s]
+    bar: int  #: pulses of a bar
+    downbeat: int  #: number of the first pulse that begins one
 
     @property
     def usual(self) -> float:
@@ -292,8 +276,7 @@ def _written(pulses: Pulses, placed: Sequence[PlacedMove], seed: int) -> Dance:
 
 ON_THE_BEAT = 0.04
 """Distance [s] from a beat within which an accent is on it: one picture of a film (25 a second)."""
-NEAR = 0.45
-"""Share of a pulse, before and after it, in which its accent is looked for."""
+NEAR = 0.45  #: Share of a pulse, before and after it, in which its accent is looked for
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,10 +20,8 @@ smaller, so that speeds are not greater. Own choice."""
 SHIFT_TIME = 0.75
 """Least time [s] in which the trunk moves over three feet, or back: own choice, near to the 0.9 s
 that a timeline takes by itself."""
-TAP_HEIGHT = 0.04
-"""Height [m] of a paw between two taps."""
-LEAST_LIFT = 0.03
-"""Least height [m], whatever the tempo."""
+TAP_HEIGHT = 0.04  #: Height [m] of a paw between two taps
+LEAST_LIFT = 0.03  #: Least height [m], whatever the tempo
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,15 +63,11 @@ class Move(ABC):
 
 @dataclass(frozen=True, slots=True)
 class Strokes(Move):
-    """The trunk moves out, perhaps from one side to the other, and back.
-
-    Attributes:
-        goals: offsets [m, rad] of the trunk on each pulse; the first one that is named is the
-            accent.
-    """
+    """The trunk moves out, perhaps from one side to the other, and back."""
 
     name: str
     goals: tuple[Mapping[str, float], ...]
+    """Offsets [m, rad] of the trunk on each pulse; the first one that is named is the accent."""
 
     def pulses(self, pulse: float) -> int:
         """One for each goal."""
@@ -172,5 +166,4 @@ MOVES: Mapping[str, Move] = {
     )
 }
 """The moves, by name. Sizes are own choices, well inside of what the check allows."""
-WALTZ = tuple(name for name in MOVES if name.startswith("waltz"))
-"""Those that take a bar of three."""
+WALTZ = tuple(name for name in MOVES if name.startswith("waltz"))  #: Those that take a bar of three

@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.errors import CommandError, MissingDependency
-from go2_wbc.extras import install_line
+from go2_wbc.errors import CommandError, MissingDependency, install_line
 from go2_wbc.files import checked_output, write_atomically
 from motions.arguments import positive
 
@@ -23,25 +22,16 @@ RATE = 22050
 """Samples per second that are kept, or made: librosa's default, half of a compact disc's."""
 LONGEST = 900.0
 """Length [s] of the longest song: a quarter of an hour, so that no file fills the memory."""
-COMPRESSION = 0.7
-"""How far an MP3 file is made smaller, from 0 to 1: about 7 kB for a second."""
-LEAD_IN = 0.5
-"""Silence [s] before the first beat of a click track."""
-CLICK_PITCH, ACCENT_PITCH = 1000.0, 1500.0
-"""Pitch [Hz] of a click, and of the first one of a bar."""
-METRES = (2, 3, 4)
-"""Beats that a bar may have: 3 are a waltz's."""
-LOUDNESS = 0.8
-"""Greatest amplitude of a song, of 1."""
-DRIFT = 0.01
-"""By which share a made song's tempo rises or falls until its end, at most."""
-JITTER = 0.004
-"""Standard deviation [s] of a played note from its place: what good players have."""
-SWING = 0.08
-"""By which share of a beat the off-beats come late, at most."""
+COMPRESSION = 0.7  #: How far an MP3 file is made smaller, from 0 to 1: about 7 kB for a second
+LEAD_IN = 0.5  #: Silence [s] before the first beat of a click track
+CLICK_PITCH, ACCENT_PITCH = 1000.0, 1500.0  #: Pitch [Hz] of a click, and of the first one of a bar
+METRES = (2, 3, 4)  #: Beats that a bar may have: 3 are a waltz's
+LOUDNESS = 0.8  #: Greatest amplitude of a song, of 1
+DRIFT = 0.01  #: By which share a made song's tempo rises or falls until its end, at most
+JITTER = 0.004  #: Standard deviation [s] of a played note from its place: what good players have
+SWING = 0.08  #: By which share of a beat the off-beats come late, at most
 
-Sound = Float[np.ndarray, " m"]
-"""Amplitudes from -1 to 1, ``RATE`` a second."""
+Sound = Float[np.ndarray, " m"]  #: Amplitudes from -1 to 1, ``RATE`` a second
 Note = Float[np.ndarray, " j"]
 
 
@@ -92,9 +82,7 @@ class Song:
     """A sound with its beats.
 
     Attributes:
-        name: for a person.
-        samples: amplitudes from -1 to 1, ``rate`` a second.
-        rate: samples per second.
+        name, samples, rate: for a person; amplitudes from -1 to 1; samples per second.
         beats: instants [s] of its beats.
     """
 
@@ -195,8 +183,7 @@ SNARES = {
     3: ((1, 2), (1, 2), (2,), (1, 2, 2.5)),
     4: ((1, 3), (1, 3), (1, 3, 3.5), (2,)),
 }
-HATS = (0.5, 1.0, 0.5, 0.25)
-"""Beats from one stroke of the cymbal to the next."""
+HATS = (0.5, 1.0, 0.5, 0.25)  #: Beats from one stroke of the cymbal to the next
 CHORDS = ((0, 5, 7, 0), (0, 9, 5, 7), (0, 7, 9, 5), (9, 5, 0, 7), (2, 7, 0, 0))
 """Roots, in semitones above the key, of four bars."""
 

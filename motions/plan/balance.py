@@ -61,26 +61,20 @@ JOINT_MARGIN = 0.02
 INSIDE = 0.03
 """Distance [m] that CoM and zero-moment point keep from the edges of three or four feet: twice the
 check's limit for the CoM. A foot then bears 18 N or more, an eighth of the weight."""
-OFF_LINE = 0.001
-"""Distance [m] that the zero-moment point may be off the line of two feet."""
-FROM_FOOT = 0.05
-"""Distance [m] that it keeps from these feet, along the line."""
+OFF_LINE = 0.001  #: Distance [m] that the zero-moment point may be off the line of two feet
+FROM_FOOT = 0.05  #: Distance [m] that it keeps from these feet, along the line
 SMOOTHING = 0.25
 """Time tau [s] over which the way is smoothed: own choice, half the time between two steps."""
-STIFFNESS = 1e4
-"""Weight rho of what is beyond the edges: what is left of it is below 0.1 mm."""
+STIFFNESS = 1e4  #: Weight rho of what is beyond the edges: what is left of it is below 0.1 mm
 KNOTS = 5
 """Pieces of the spline in the shortest time between two changes of the contacts, at least."""
 SHORTEST, LONGEST = 0.03, 0.08
 """Length [s] of a piece: three samples, and what the smoothing asks for."""
-MOST_STEPS = 40
-"""Newton steps; they end by themselves after some ten."""
-HALVES = tuple(0.5**k for k in range(6))
-"""Shares of a step that are tried."""
+MOST_STEPS = 40  #: Newton steps; they end by themselves after some ten
+HALVES = tuple(0.5**k for k in range(6))  #: Shares of a step that are tried
 GAIN = 1e-4
 """Least share of f that a step must gain: it moves the way by less than a micrometre or two."""
-CENTRING_STEPS = 5
-"""Steps that put the CoM in its place; see ``place``."""
+CENTRING_STEPS = 5  #: Steps that put the CoM in its place; see ``place``
 PASSES = 3
 """Times that the way is found; from the second on with what the pendulum leaves out, as the whole
 robot's dynamics say of the last way (Kajita et al. 2003, sec. 5)."""
@@ -181,23 +175,14 @@ def nearest(times: Times, t: float) -> int:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stepping:
-    """What is known of a stretch in which feet step, at n instants.
+    """What is known of a stretch in which feet step, at n instants."""
 
-    Attributes:
-        times: increasing, evenly [s].
-        p_com: (n, 3) where the CoM would be [m].
-        stance: (n, 4) feet that stand.
-        p_feet: (n, 4, 3) where the feet are [m].
-        gravity: [m/s^2].
-        bias: (n, 2) zero-moment point less that of the pendulum [m].
-    """
-
-    times: Times
-    p_com: Float[np.ndarray, "n 3"]
-    stance: Bool[np.ndarray, "n 4"]
-    p_feet: Float[np.ndarray, "n 4 3"]
-    gravity: float
-    bias: Float[np.ndarray, "n 2"]
+    times: Times  #: (n,) increasing, evenly [s]
+    p_com: Float[np.ndarray, "n 3"]  #: (n, 3) where the CoM would be [m]
+    stance: Bool[np.ndarray, "n 4"]  #: (n, 4) feet that stand
+    p_feet: Float[np.ndarray, "n 4 3"]  #: (n, 4, 3) where the feet are [m]
+    gravity: float  #: [m/s^2]
+    bias: Float[np.ndarray, "n 2"]  #: (n, 2) zero-moment point less that of the pendulum [m]
 
     @property
     def lever(self) -> Times:

@@ -27,27 +27,21 @@ from go2_wbc.tracking.plan_curves import CURVES, PlanCurves, StanceLoad
 from motions.batch_kinematics import Wanted, attitudes
 from motions.dynamics.dynamic_trajectory import BALANCING_FEET, DynamicTrajectory, sampled
 from motions.dynamics.phases import PhaseProblem, Tolerance
-from motions.dynamics.projection import PlanTarget
+from motions.dynamics.solver import PlanTarget
 from motions.postures import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN
 
 
 @dataclass(frozen=True, slots=True)
 class DynamicSpan:
-    """Part of a plan that obeys the whole robot's dynamics.
+    """Part of a plan that obeys the whole robot's dynamics."""
 
-    Attributes:
-        start: when [s] it starts in the plan.
-        frame: where: the frame of its problem in that of the plan.
-        asked: phases, or a motion that physics does not allow as it was written, in ``frame``.
-        trajectory: states, torques, forces, gains and deviation; in the plan's frame.
-        tolerance: how far it may be from what was asked.
-    """
-
-    start: float
-    frame: Anchor
+    start: float  #: when [s] it starts in the plan
+    frame: Anchor  #: where: the frame of its problem in that of the plan
     asked: PhaseProblem | PlanTarget
+    """Phases, or a motion that physics does not allow as it was written, in ``frame``."""
     trajectory: DynamicTrajectory
-    tolerance: Tolerance = Tolerance()
+    """States, torques, forces, gains and deviation; in the plan's frame."""
+    tolerance: Tolerance = Tolerance()  #: how far it may be from what was asked
 
     @property
     def end(self) -> float:
@@ -122,23 +116,16 @@ class DynamicSpan:
 
 @dataclass(frozen=True, slots=True)
 class SpanSamples:
-    """A span at k instants.
+    """A span at k instants."""
 
-    Attributes:
-        q, v: (k, 19), (k, 18) states, between the knots as the solver steps.
-        a: (k, 18) accelerations.
-        tau: (k, 12) torques [N m].
-        forces: (k, 4, 3) of the ground on the feet [N].
-        v_motors: (k, 12) joint speeds [rad/s] at which the motors must give the torques: of those
-            at both ends of the step, through which a torque holds, the one at which they give less.
-    """
-
-    q: Float[np.ndarray, "k 19"]
-    v: Float[np.ndarray, "k 18"]
-    a: Float[np.ndarray, "k 18"]
-    tau: Float[np.ndarray, "k 12"]
-    forces: Float[np.ndarray, "k 4 3"]
+    q: Float[np.ndarray, "k 19"]  #: (k, 19) configurations, between the knots as the solver steps
+    v: Float[np.ndarray, "k 18"]  #: (k, 18) velocities, likewise
+    a: Float[np.ndarray, "k 18"]  #: (k, 18) accelerations
+    tau: Float[np.ndarray, "k 12"]  #: (k, 12) torques [N m]
+    forces: Float[np.ndarray, "k 4 3"]  #: (k, 4, 3) forces of the ground on the feet [N]
     v_motors: Float[np.ndarray, "k 12"]
+    """(k, 12) joint speeds [rad/s] at which the motors must give the torques: of those at both ends
+    of the step, through which a torque holds, the one at which they give less."""
 
 
 def placed(trajectory: DynamicTrajectory, anchor: Anchor) -> DynamicTrajectory:
@@ -199,44 +186,30 @@ FORCE_WEIGHT = 1e-2
 """Weight [1/N^2] by which the forces of a solved part are kept to: they lie in the friction cone
 that it was solved with, an even share of the load may not. From 0.001 to 0.1 it makes no difference
 to slips (own experiments)."""
-_CUBIC = 4
-"""Coefficients of a cubic."""
+_CUBIC = 4  #: Coefficients of a cubic
 LEAST_FEET = 3
 """Standing feet that span an area, so that a robot that stops there can keep standing."""
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """What cannot be done as it is written.
+    """What cannot be done as it is written."""
 
-    Attributes:
-        check: what the feasibility check calls it.
-        subject: the leg, or the trunk.
-        time: when [s] it is worst.
-        miss: distance [m] by which the leg is too short; nan if that is not what is wrong.
-        reason: why no pose is balanced.
-    """
-
-    check: str
-    subject: str
-    time: float
+    check: str  #: what the feasibility check calls it
+    subject: str  #: the leg, or the trunk
+    time: float  #: when [s] it is worst
     miss: float = np.nan
-    reason: str = ""
+    """Distance [m] by which the leg is too short; nan if that is not what is wrong."""
+    reason: str = ""  #: why no pose is balanced
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanSamples(Wanted):
-    """The part of many references that says where the robot shall be.
+    """The part of many references that says where the robot shall be."""
 
-    Attributes:
-        times: (n,) [s].
-        stance: (n, 4) feet that stand.
-        normal_force_max: (n, 4) greatest normal force [N] of each foot.
-    """
-
-    times: Float[np.ndarray, " n"]
-    stance: Bool[np.ndarray, "n 4"]
-    normal_force_max: Float[np.ndarray, "n 4"]
+    times: Float[np.ndarray, " n"]  #: (n,) [s]
+    stance: Bool[np.ndarray, "n 4"]  #: (n, 4) feet that stand
+    normal_force_max: Float[np.ndarray, "n 4"]  #: (n, 4) greatest normal force [N] of each foot
 
     @staticmethod
     def one_by_one(
@@ -272,8 +245,7 @@ class CompiledPlan(MotionPlan):
             the others in the air follow their joints.
         ramp: time [s] over which a foot is unloaded before lift-off and loaded after touchdown.
         problems: what could not be done as written.
-        spans: start and end [s] of the named holds.
-        beats: instants [s] that it counts in.
+        spans, beats: start and end [s] of the named holds, and instants [s] that it counts in.
         dynamic: its parts that obey the whole robot's dynamics.
         held: by the names of spans, the foot that must be held up then; see ``held_feet``.
     """
@@ -295,7 +267,6 @@ class CompiledPlan(MotionPlan):
     _repr_html_ = inline_html
 
     def __repr__(self) -> str:
-        """Its name, length and ends."""
         ends = f"{self.entry.value} to {self.exit.value}"
         return f"CompiledPlan({self.name!r}, {self.duration:.2f} s, {ends})"
 

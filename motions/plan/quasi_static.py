@@ -35,8 +35,7 @@ mm that tracking adds."""
 UNLOAD_TIME = 0.3
 """Time [s] over which a foot gives up its load before lift-off, if there is that much: own choice,
 so that the forces of the others change slowly."""
-LEAST_RAMP = 0.03
-"""The same [s] where one foot lands as another lifts off."""
+LEAST_RAMP = 0.03  #: The same [s] where one foot lands as another lifts off
 
 
 def compile_quasi_static(
@@ -110,19 +109,15 @@ def _out_of_reach(legs: JointPaths, times: Times) -> list[Problem]:
 
 
 class FootContacts:
-    """The feet of a timeline: when they are off the ground, and when they step.
-
-    Attributes:
-        flights: of each leg, spans [s] in which its foot is in the air; the last may be endless.
-        swings: of each leg, spans [s] in which its foot steps.
-    """
+    """The feet of a timeline: when they are off the ground, and when they step."""
 
     def __init__(self, timeline: Timeline) -> None:
-        """Of the keys of ``timeline``."""
         self.swings: dict[Leg, list[tuple[float, float]]] = {leg: [] for leg in LEGS}
+        """Spans [s] of steps."""
         for step in timeline.in_order(StepKey):
             self.swings[step.leg].append((step.start, step.end))
         self.flights = {leg: list(spans) for leg, spans in self.swings.items()}
+        """Of each leg, spans [s] in which its foot is in the air; the last may be endless."""
         begun: dict[Leg, float] = {}
         for key in timeline.in_order(LegKey):
             begin = begun.setdefault(key.leg, key.start)

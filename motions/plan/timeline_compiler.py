@@ -30,7 +30,7 @@ from motions.dynamics.dynamic_trajectory import DynamicTrajectory
 from motions.dynamics.knots import standing
 from motions.dynamics.phases import PhaseProblem, Progress
 from motions.dynamics.plan_cache import nearest_cached, solve_cached
-from motions.dynamics.projection import PlanTarget
+from motions.dynamics.solver import PlanTarget
 from motions.language.dynamic_blocks import away_from_home
 from motions.language.keys import BalanceShift, BodyKey, FootHold, Key, Mark, PhaseKey
 from motions.language.timeline import Timeline
@@ -55,27 +55,19 @@ motion ends, an instant is enough."""
 LEAD = 0.3
 """Time [s] at rest that is solved with what follows or goes before, if there is so much: to begin a
 quick move early, and to come to rest after it. Own choice, 1.7 times sqrt(0.29 m / g)."""
-SLOW = 5e-4
-"""Way [m, rad] between two samples, at most, of what does not just pass home: 0.05 /s."""
-NEAR = 10
-"""Samples beside a rest that are as good as part of it: moves begin and end slowly."""
-SAME_POSE = 1e-4
-"""Difference [m, rad] of configurations that counts as none; splines ring by less."""
+SLOW = 5e-4  #: Way [m, rad] between two samples, at most, of what does not just pass home: 0.05 /s
+NEAR = 10  #: Samples beside a rest that are as good as part of it: moves begin and end slowly
+SAME_POSE = 1e-4  #: Difference [m, rad] of configurations that counts as none; splines ring by less
 
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A part of a motion, from rest to rest.
+    """A part of a motion, from rest to rest."""
 
-    Attributes:
-        first, last: rows of its path.
-        start, end: when [s] in the motion.
-    """
-
-    first: int
-    last: int
-    start: float
-    end: float
+    first: int  #: row of its path
+    last: int  #: row of its path
+    start: float  #: when [s] in the motion
+    end: float  #: when [s] in the motion
 
     def written(self, path: Trajectory) -> PlanTarget:
         """What is written there; a foot that leaves at the motion's first instant stands then.

@@ -116,32 +116,21 @@ def eased(key: Key, times: Times) -> Float[np.ndarray, " n"]:
 
 @dataclass(frozen=True, slots=True)
 class JointPaths:
-    """What all legs do at n instants.
+    """What all legs do at n instants."""
 
-    Attributes:
-        q: (n, 12) joint angles [rad].
-        miss: (n, 4) distance [m] by which each foot is asked for more than its leg reaches.
-    """
-
-    q: Joints
+    q: Joints  #: (n, 12) joint angles [rad]
     miss: Float[np.ndarray, "n 4"]
+    """(n, 4) distance [m] by which each foot is asked for more than its leg reaches."""
 
 
 @dataclass(frozen=True, slots=True)
 class Instants:
-    """Where trunk and feet are at n increasing instants.
+    """Where trunk and feet are at n increasing instants."""
 
-    Attributes:
-        times: (n,) [s].
-        p_base: (n, 3) place of the base [m].
-        R: (n, 3, 3) its attitude.
-        ground: where the feet stand.
-    """
-
-    times: Times
-    p_base: Float[np.ndarray, "n 3"]
-    R: Float[np.ndarray, "n 3 3"]
-    ground: Ground
+    times: Times  #: (n,) [s]
+    p_base: Float[np.ndarray, "n 3"]  #: (n, 3) place of the base [m]
+    R: Float[np.ndarray, "n 3 3"]  #: (n, 3, 3) its attitude
+    ground: Ground  #: where the feet stand
 
     @staticmethod
     def of(times: Times, body: Poses, ground: Ground) -> Instants:
@@ -154,11 +143,7 @@ class Instants:
 
 
 class LegTracks:
-    """Evaluates the legs' tracks of a timeline along a path of the trunk.
-
-    Attributes:
-        footing: where the feet stand.
-    """
+    """Evaluates the legs' tracks of a timeline along a path of the trunk."""
 
     def __init__(
         self, timeline: Timeline, footing: Footing, model: RobotModel, home: Float[np.ndarray, "6"]
@@ -170,7 +155,7 @@ class LegTracks:
         for key in timeline.in_order(LegKey):
             self._keys[key.leg].append(key)
         self._starts = {leg: [key.start for key in keys] for leg, keys in self._keys.items()}
-        self.footing = footing
+        self.footing = footing  #: where the feet stand
         self._p_home, self._R_home = home[:3], attitudes(home[None, 3:])[0]
         self._keys = {leg: self._completed(leg, keys) for leg, keys in self._keys.items()}
 

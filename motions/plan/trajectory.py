@@ -20,51 +20,33 @@ from go2_wbc.errors import MotionError
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.recording import true_runs
 from go2_wbc.robot.model import RobotModel
-from motions.batch_kinematics import (
-    angles_of,
-    attitudes,
-    centres_of_mass,
-    configurations,
-    place,
-    rates,
-)
-from motions.dynamics.projection import PlanTarget
+from motions import batch_kinematics
+from motions.dynamics.solver import PlanTarget
 from motions.plan.compiled_plan import CompiledPlan, DynamicSpan, PlanSamples
 from motions.plan.tracks import sample_times
 from motions.postures import standing_feet
 
-CENTRING_STEPS = 5
-"""Steps that put the CoM in its place; see ``place``."""
+CENTRING_STEPS = 5  #: Steps that put the CoM in its place; see ``place``
 
 
 @dataclass(frozen=True, slots=True)
 class Trajectory:
-    """A motion of the whole robot, in the frame of the motion.
+    """A motion of the whole robot, in the frame of the motion."""
 
-    Attributes:
-        times: (n,) [s].
-        q: (n, 19) position, quaternion, joints. v, a: (n, 18) its velocity and acceleration, both
-            of the base in its own frame.
-        rpy: (n, 3) roll, pitch, yaw [rad] of the trunk.
-        p_com: (n, 3) CoM [m].
-        stance: (n, 4) feet that stand.
-        load_share: (n, 4) share of its load that a foot may bear.
-        p_feet: (n, 4, 3) where the feet are [m] of legs that do not follow their joints.
-        miss: (n, 4) distance [m] by which such a foot is out of its leg's reach.
-        is_dynamic: (n,) instants in spans that obey the whole robot's dynamics, of which they are.
-    """
-
-    times: Float[np.ndarray, " n"]
-    q: Float[np.ndarray, "n 19"]
-    v: Float[np.ndarray, "n 18"]
-    a: Float[np.ndarray, "n 18"]
-    rpy: Float[np.ndarray, "n 3"]
-    p_com: Float[np.ndarray, "n 3"]
-    stance: Bool[np.ndarray, "n 4"]
-    load_share: Float[np.ndarray, "n 4"]
+    times: Float[np.ndarray, " n"]  #: (n,) [s]
+    q: Float[np.ndarray, "n 19"]  #: (n, 19) position, quaternion, joints
+    v: Float[np.ndarray, "n 18"]  #: (n, 18) its velocity, of the base in its own frame
+    a: Float[np.ndarray, "n 18"]  #: (n, 18) its acceleration, likewise
+    rpy: Float[np.ndarray, "n 3"]  #: (n, 3) roll, pitch, yaw [rad] of the trunk
+    p_com: Float[np.ndarray, "n 3"]  #: (n, 3) CoM [m]
+    stance: Bool[np.ndarray, "n 4"]  #: (n, 4) feet that stand
+    load_share: Float[np.ndarray, "n 4"]  #: (n, 4) share of its load that each may bear
     p_feet: Float[np.ndarray, "n 4 3"]
+    """(n, 4, 3) where the feet are [m] of legs that do not follow their joints."""
     miss: Float[np.ndarray, "n 4"]
+    """(n, 4) distance [m] by which such a foot is out of its leg's reach."""
     is_dynamic: Bool[np.ndarray, " n"]
+    """(n,) instants in spans that obey the whole robot's dynamics, of which they are."""
 
     __repr__ = brief
 
@@ -80,15 +62,17 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
     p_feet = standing_feet(model)
     asked = plan.samples(times) if is_compiled else PlanSamples.one_by_one(plan, times, p_feet)
     _require_finite(asked)
-    rpy = np.unwrap(angles_of(asked.R), axis=0)
-    placed = place(replace(asked, R=attitudes(rpy)), CENTRING_STEPS, model)
-    q = configurations(np.hstack([placed.p_base, rpy]), placed.q_joints)
+    rpy = np.unwrap(batch_kinematics.angles_of(asked.R), axis=0)
+    placed = batch_kinematics.place(
+        replace(asked, R=batch_kinematics.attitudes(rpy)), CENTRING_STEPS, model
+    )
+    q = batch_kinematics.configurations(np.hstack([placed.p_base, rpy]), placed.q_joints)
     spans = plan.dynamic if isinstance(plan, CompiledPlan) else ()
     is_dynamic = _are_within(times, spans)
     v, a = np.zeros((len(times), 18)), np.zeros((len(times), 18))
     for rows in true_runs(~is_dynamic):
         if rows.stop - rows.start > 1:
-            v[rows], a[rows] = rates(times[rows], q[rows], rpy[rows])
+            v[rows], a[rows] = batch_kinematics.rates(times[rows], q[rows], rpy[rows])
     greatest = asked.normal_force_max
     path = Trajectory(
         times=times,
@@ -137,10 +121,10 @@ def _fill(path: Trajectory, span: DynamicSpan, model: RobotModel) -> None:
     found = span.at(path.times[rows], model)
     path.q[rows], path.v[rows], path.a[rows] = found.q, found.v, found.a
     turns = np.array([pin.Quaternion(q[3:7]).toRotationMatrix() for q in found.q])
-    own = np.unwrap(angles_of(turns), axis=0)
+    own = np.unwrap(batch_kinematics.angles_of(turns), axis=0)
     path.rpy[rows] = own + 2.0 * np.pi * np.round((path.rpy[rows][:1] - own[:1]) / (2.0 * np.pi))
     poses = np.hstack([found.q[:, :3], path.rpy[rows]])
-    path.p_com[rows] = centres_of_mass(poses, found.q[:, 7:], model)
+    path.p_com[rows] = batch_kinematics.centres_of_mass(poses, found.q[:, 7:], model)
     path.miss[rows] = 0.0
 
 

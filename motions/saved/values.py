@@ -26,15 +26,11 @@ import go2_wbc
 from go2_wbc.errors import Go2WbcError, MotionFileError, unknown_name
 from motions.arguments import is_number
 
-Json: TypeAlias = Any
-"""What ``json.loads`` gives, or takes."""
-Kind: TypeAlias = Any
-"""An annotation."""
-Decoded: TypeAlias = Any
-"""An instance of it."""
+Json: TypeAlias = Any  #: What ``json.loads`` gives, or takes
+Kind: TypeAlias = Any  #: An annotation
+Decoded: TypeAlias = Any  #: An instance of it
 _ARRAY = "array"
-_NUMBERS = "bif"
-"""What NumPy calls truth values, whole numbers and floats."""
+_NUMBERS = "bif"  #: What NumPy calls truth values, whole numbers and floats
 
 
 @final

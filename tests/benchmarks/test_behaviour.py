@@ -10,8 +10,7 @@ from benchmarks import robots
 from benchmarks.demo_sequence import CRITERIA, StepCheck
 from benchmarks.high_five import highest_window, largest_slip, longest_run
 from benchmarks.robots import plant_of
-from controller.demo.run import DemoProgress
-from controller.demo.steps import DEMO_STEPS, StepResult
+from controller.demo.steps import DEMO_STEPS, DemoProgress, StepResult
 from controller.sweeps.trials import (
     Trial,
     TrialFailed,

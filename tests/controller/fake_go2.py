@@ -18,8 +18,8 @@ from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.trunk import BodyPose
 from go2_wbc.recording import Recording
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import RobotState
 from motions import CompiledPlan, FeasibilityChecker, Playable
 

@@ -11,10 +11,10 @@ from typing import TypeVar
 import numpy as np
 import pytest
 
-from controller.behaviours.joints import DAMPING
+from controller.behaviours import DAMPING
 from go2_wbc.plant import MujocoPlant, Plant
 from go2_wbc.reference import Reference
-from go2_wbc.robot.profile import find_profile
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.state import JointCommand, RobotState, Snapshot
 from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
 

@@ -9,8 +9,8 @@ from controller.modes import Aborted, are_within, told
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import HeldFoot, MotionPlan, Posture
 from go2_wbc.reference import Reference
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.tracking.landing import Landings
 from go2_wbc.tracking.plan_tracking import Deviation

@@ -26,6 +26,7 @@ HARD, HARD_ASIDE = 30.0, 22.0
 HARDEST, HARDEST_ASIDE = 45.0, 36.0
 HARDEST_TROTTING = 50.0
 SOFT = 6.0
+LIFT = 60.0  # N; a foot bears 37
 # s; in which it stands again.
 LIMIT = 3.0
 SNAPSHOT = RobotModel().snapshot(state_of(standing_q()))
@@ -93,6 +94,39 @@ def test_a_push_that_feet_in_place_hold_starts_no_step() -> None:
         feet = go2._runner.loop.snapshot.p_world_feet
         go2.wait(1.0)
         assert np.abs(go2._runner.loop.snapshot.p_world_feet - feet).max() < 0.01
+
+
+@pytest.mark.parametrize(("foot", "time"), [("FL_foot", 0.3), ("RR_foot", 1.0)])
+def test_a_foot_that_is_lifted_presses_back_and_is_named(foot: str, time: float) -> None:
+    # It fell: the leg was pushed up to the trunk by what it was to stand on.
+    plant = MujocoPlant(control_period=PERIOD, sensors="imu")
+    with GO2Controller(plant=plant) as go2:
+        assert go2.stand()
+        plant.push(np.array([0.0, 0.0, LIFT]), time, at=foot)
+        begun, tilts = plant.time, []
+        while plant.time < begun + time + 1.0:
+            go2.wait(0.05)
+            tilts.append(plant.truth().tilt)
+        assert max(tilts) < np.radians(10.0)
+        assert [fault.part for fault in go2.health.faults] == [foot]
+        assert go2.health.faults[0].since < begun + 0.25
+        assert go2.stand()
+        assert plant.p_world_feet[:, 2].max() < 0.03
+
+
+def test_it_carries_a_load_over_its_feet_wherever_the_estimate_takes_them() -> None:
+    with GO2Controller(plant=MujocoPlant(control_period=PERIOD, payload=6.0)) as go2:
+        assert go2.stand()
+        go2.wait(2.5)
+        loop, tracker = go2._runner.loop, go2._runner.loop.behaviour._tracker
+        assert loop.snapshot.payload[0] > 4.0
+        tracker._state.landing.anchor.p_world[2] -= 0.01  # as after a trot
+        go2.wait(2.0)
+        feet = loop.snapshot.p_world_feet[:, 2].mean()
+        assert tracker.anchor.p_world[2] == pytest.approx(
+            feet - loop.snapshot.foot_radius, abs=5e-4
+        )
+        assert loop.behaviour.sag_and_lean[0] < 0.002
 
 
 @pytest.mark.parametrize("what", ["stand", "sit", "lie_down", "high_five", "bow"])

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controller.behaviours.plans import PlayPlan
-from controller.behaviours.safe_return import SafeReturn, nearest_safe_instant, retimed
+from controller.behaviours.plans import PlayPlan, SafeReturn, nearest_safe_instant, retimed
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
 from go2_wbc.contacts import ContactSchedule

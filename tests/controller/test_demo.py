@@ -12,8 +12,7 @@ import pytest
 
 from controller import GO2Controller
 from controller.demo import DEMO_STEPS, DemoProgress, Measurement, StepResult, run_demo
-from controller.demo.run import three_leg_minima
-from controller.demo.steps import terrain_steps
+from controller.demo.steps import terrain_steps, three_leg_minima
 from go2_wbc.errors import IkError, PlantTimeout
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.terrain import BOTH, Stairs

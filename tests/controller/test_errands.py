@@ -6,7 +6,7 @@ from itertools import count
 
 import pytest
 
-from controller.errands import NOT_YET, BackgroundLog, Errands, LoopEnded, LoopHangs, Pending
+from controller.pacing import NOT_YET, BackgroundLog, Errands, LoopEnded, LoopHangs, Pending
 from tests.controller.plants import HANG_GUARD, in_thread
 
 

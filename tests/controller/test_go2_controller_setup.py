@@ -24,10 +24,9 @@ from go2_wbc.errors import (
 )
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.reference import Reference
-from go2_wbc.robot.description import find_description
+from go2_wbc.robot.description import find_description, find_profile
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import MOTORS
-from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.problem import SIZE, Rows

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from controller.inline import LONGEST, html_of
-from controller.seen_terrain import SeenTerrain
 from controller.sweeps.run import SweepResult
 from controller.sweeps.sweep_file import Row
+from controller.telemetry import SeenTerrain
 from go2_wbc import brief
 from go2_wbc.planning.height_map import HeightMap, fuse
 from go2_wbc.recording import Recording

@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controller.behaviours import Behaviour
-from controller.behaviours.joints import Damped, ServoJoints
+from controller.behaviours import Behaviour, Damped, ServoJoints
 from controller.loop import ControlLoop, Fault
 from controller.telemetry import Telemetry
 from go2_wbc.contacts import find_gait
@@ -15,13 +14,13 @@ from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible, ResidualRow
 from go2_wbc.planning.command import ZERO_COMMAND
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.reference import JointReference, Reference
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.safety import SafetyConfig
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
-from go2_wbc.wbc.relaxation import LIMITS
+from go2_wbc.wbc.solvers import LIMITS
 from tests.controller.plants import PERIOD, StillPlant, break_qp, is_limp
 
 TUCKED_JOINTS = find_profile().tucked_joints

@@ -28,8 +28,7 @@ from go2_wbc.reference import Anchor, LegTask, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy, rpy_from_rotation
 from motions import CompiledPlan, Timeline, compile_timeline, deg
-from motions.dynamics.phase_builders import FOOTPRINT
-from motions.dynamics.phases import PhaseProblem
+from motions.dynamics.phases import FOOTPRINT, PhaseProblem
 from motions.postures import lie_down
 from tests.go2_wbc.plant.helpers import empty_recording
 

@@ -10,7 +10,7 @@ import pytest
 from controller import GO2Controller
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.payload import Payload
+from go2_wbc.robot.rigid_body import Payload
 from go2_wbc.robot.state import RobotState, Snapshot
 from motions import FeasibilityChecker
 from motions.feasibility.report import FeasibilityReport

@@ -20,9 +20,9 @@ from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.reference import Anchor, LegTask, Target
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import JointFriction
-from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.state import RobotState, Snapshot
 from motions import compile_motion

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from controller import GO2Controller, Mode, recovery
-from controller.behaviours.joints import DAMPING
+from controller.behaviours import DAMPING
 from controller.modes import unfolded_legs
 from go2_wbc.legs import Leg
 from go2_wbc.plant import MujocoPlant
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import JointCommand, RobotState
 from tests.controller.plants import PERIOD, WatchedPlant
 from tests.engine_helpers import state_of

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 import controller.runner
-from controller.behaviours.joints import Damped, ServoJoints
+from controller.behaviours import Damped, ServoJoints
 from controller.loop import ControlLoop, Fault
 from controller.modes import Aborted
 from controller.runner import Runner
 from controller.telemetry import Telemetry
 from go2_wbc.errors import ClosedError, ModeError, PlantTimeout
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.safety import SafetyConfig
 from go2_wbc.wbc.controller import WholeBodyController
 from tests.controller.plants import (

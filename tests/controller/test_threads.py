@@ -20,7 +20,7 @@ from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.problem import SIZE, Rows
 from go2_wbc.wbc.tasks import Task
 from motions import Timeline
-from motions.dynamics.search import Clock
+from motions.dynamics.shooting_problem import Clock
 from tests.controller.plants import (
     HANG_GUARD,
     StillPlant,

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from jaxtyping import Float
 
-from go2_wbc import compilation, kept_code
+from go2_wbc import compilation, machine_code
 from go2_wbc.compilation import Foreign, kernel, subroutine
-from go2_wbc.kept_code import CACHE_VARIABLE, KEPT, kernel_folder
+from go2_wbc.machine_code import CACHE_VARIABLE, KEPT, kernel_folder
 
 ROOT = str(Path(__file__).resolve().parents[2])
 SCRIPT = """
@@ -87,7 +87,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def forget() -> None:
     kernel_folder.cache_clear()
-    kept_code.say_that_it_takes_time.cache_clear()
+    machine_code.say_that_it_takes_time.cache_clear()
 
 
 def test_a_kernel_is_compiled_once_and_says_so(
@@ -137,7 +137,7 @@ def test_a_kernel_that_is_wrong_leaves_what_is_kept_of_others_alone(folder: Path
     def wrong(x: float) -> float:
         return x.nothing  # type: ignore[attr-defined]
 
-    with pytest.raises(kept_code.numba.core.errors.NumbaError):
+    with pytest.raises(machine_code.numba.core.errors.NumbaError):
         wrong(1.0)
     assert kept(folder) == before
 
@@ -155,9 +155,9 @@ def test_a_place_that_cannot_be_written_costs_time_only(
 @pytest.mark.parametrize(
     ("owner", "name", "value"),
     [
-        (kept_code.llvmlite.binding, "get_host_cpu_name", lambda: "another"),
-        (kept_code.platform, "python_version", lambda: "3.99.0"),
-        (kept_code.numba, "__version__", "99.0"),
+        (machine_code.llvmlite.binding, "get_host_cpu_name", lambda: "another"),
+        (machine_code.platform, "python_version", lambda: "3.99.0"),
+        (machine_code.numba, "__version__", "99.0"),
         (square, "__module__", "moved_to"),  # kept code imports where its parts were
     ],
 )
@@ -165,9 +165,9 @@ def test_another_processor_version_or_place_gets_files_of_its_own(
     folder: Path, monkeypatch: pytest.MonkeyPatch, owner: object, name: str, value: object
 ) -> None:
     routine = kernel(square)
-    first = kept_code.fingerprint(routine)  # type: ignore[arg-type]
+    first = machine_code.fingerprint(routine)  # type: ignore[arg-type]
     monkeypatch.setattr(owner, name, value)
-    assert kept_code.fingerprint(routine) != first  # type: ignore[arg-type]
+    assert machine_code.fingerprint(routine) != first  # type: ignore[arg-type]
 
 
 def test_what_changes_compiles_what_depends_on_it_and_nothing_else(tmp_path: Path) -> None:
@@ -268,9 +268,9 @@ def test_every_module_that_holds_kernels_is_loaded_ahead() -> None:
 
 
 def test_the_users_own_numba_cache_is_left_alone(folder: Path) -> None:
-    before = kept_code.numba.config.CACHE_DIR
+    before = machine_code.numba.config.CACHE_DIR
     compile_square()
-    assert before == kept_code.numba.config.CACHE_DIR
+    assert before == machine_code.numba.config.CACHE_DIR
     logging.getLogger("numba").setLevel(logging.WARNING)
 
 

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from go2_wbc.curves import Curve, Ease
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.reference import LegTask, TrackedPoint
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.rotations import rotation_from_rpy, yaw_rotation
 from motions.postures import NORMAL_FORCE_MAX, PosturePlan, lie_down, rise, sit_down, sit_raise
 from tests.engine_helpers import angular_velocity_from_rpy

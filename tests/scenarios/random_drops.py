@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controller import GO2Controller
-from controller.behaviours.joints import DAMPING
+from controller.behaviours import DAMPING
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand

@@ -9,9 +9,9 @@ from controller import GO2Controller
 from controller.behaviours.plans import PlayPlan
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.robot.payload import NO_PAYLOAD
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.payload_estimation import PayloadConfig
-from go2_wbc.robot.profile import find_profile
+from go2_wbc.robot.rigid_body import NO_PAYLOAD
 from motions.postures import lean
 
 STAND_POSE = find_profile().stand_pose

@@ -6,8 +6,8 @@ from jaxtyping import Float
 from go2_wbc.legs import Leg
 from go2_wbc.planning.height_map import CELL
 from go2_wbc.recording import Recording
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import find_profile
 
 FOOT_RADIUS = find_profile().foot_radius
 

@@ -17,6 +17,7 @@ from jaxtyping import Float
 from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.recording import Recording
 from go2_wbc.robot.description import (
+    GO2,
     MeshPart,
     RobotDescription,
     find_description,
@@ -24,7 +25,6 @@ from go2_wbc.robot.description import (
     read_mesh,
     solid,
 )
-from go2_wbc.robot.profile import GO2
 from viz.render.mesh import Surface, simplify, smooth_surface
 
 _CREASE = np.deg2rad(22.0)  # the files have lost their smoothing; 22 deg looks like it
@@ -36,19 +36,13 @@ _BLACK_LIFT = 34 / 255  # least value of a colour: pure black would show no shap
 
 @dataclass(frozen=True, slots=True)
 class RobotVisuals:
-    """Everything that is drawn of the robot.
-
-    Attributes:
-        meshes: the surfaces of each mesh file in its own frame, one for each colour, by its path.
-        geometry: which mesh sits where, in the URDF's order.
-        model: Pinocchio's kinematic model (free flyer).
-        description: of the robot.
-    """
+    """Everything that is drawn of the robot."""
 
     meshes: dict[str, tuple[Surface, ...]]
-    geometry: pin.GeometryModel
-    model: pin.Model
-    description: RobotDescription
+    """The surfaces of each mesh file in its own frame, one for each colour, by its path."""
+    geometry: pin.GeometryModel  #: which mesh sits where, in the URDF's order
+    model: pin.Model  #: Pinocchio's kinematic model (free flyer)
+    description: RobotDescription  #: of the robot
 
     @property
     def foot_radius(self) -> float:
@@ -132,7 +126,7 @@ def _as_in_mjcf(path: str, empty: RobotVisuals) -> RobotVisuals:
     Where its bodies have their frames is its author's choice: shapes are placed as they lie when
     all joints are at 0, which means the same in both.
     """
-    from go2_wbc.plant.mujoco.visuals import drawn_shapes
+    from go2_wbc.plant.mujoco.model import drawn_shapes
 
     meshes, shapes = drawn_shapes(path)
     data = empty.model.createData()

@@ -20,10 +20,8 @@ from go2_wbc.recording import Recording
 from viz.render.robot_meshes import visuals_of
 from viz.replay.page_data import BASE, WORLD, label_starts, links_of
 
-DIGITS = 6
-"""After the point of every number: um, urad."""
-_INFO = 2
-"""Level of a ``foxglove.Log``."""
+DIGITS = 6  #: After the point of every number: um, urad
+_INFO = 2  #: Level of a ``foxglove.Log``
 
 
 def mcap_of(recording: Recording) -> bytes:

@@ -19,8 +19,7 @@ from typing import final
 
 from go2_wbc.errors import ConfigError
 from viz.content import ReplayContent, checked_content
-from viz.replay.html_page import page_text
-from viz.replay.page_data import content_text, scene_text
+from viz.replay.page_data import content_text, page_text, scene_text
 
 _log = logging.getLogger(__name__)
 
@@ -28,10 +27,8 @@ LOOPBACK = "127.0.0.1"
 LOOPBACK_NAMES = (LOOPBACK, "localhost", "[::1]")
 _HEARTBEAT = 10.0
 """A page that hears nothing for so long [s] gets an empty line, which finds closed pages."""
-_MOST_SENT = 4096
-"""Longest text [bytes] that a page may send."""
-Values = dict[str, float | str]
-"""What was chosen for parameters, by their names."""
+_MOST_SENT = 4096  #: Longest text [bytes] that a page may send
+Values = dict[str, float | str]  #: What was chosen for parameters, by their names
 _HEADERS = {
     "Cache-Control": "no-store",
     "Content-Security-Policy": "default-src 'self' 'unsafe-inline' data: blob:",
@@ -122,7 +119,6 @@ class PreviewServer(ThreadingHTTPServer):
         self.server_close()
 
     def __exit__(self, *_: object) -> None:
-        """Close."""
         self.close()
 
     def page(self) -> str:

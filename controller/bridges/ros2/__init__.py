@@ -23,8 +23,7 @@ BEHAVIOR_SERVICE, STATISTICS_SERVICE = "robot_behavior_command", "statistics"
 MOTION_ACTION = "play_motion"
 CMD_VEL, ODOM = "cmd_vel", "odom"
 SERVER_NODE = "go2_wbc"
-COMMAND_PERIOD = 0.02
-"""Time [s] between two sendings of a velocity command that lasts."""
+COMMAND_PERIOD = 0.02  #: Time [s] between two sendings of a velocity command that lasts
 COMMAND_QUEUE = 100
 """Commands that are kept for the loop: two seconds' worth, should the machine be that busy."""
 

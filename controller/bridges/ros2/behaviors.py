@@ -24,10 +24,8 @@ ORDERS: Mapping[str, Callable[[GO2Controller], bool]] = {
     "take_over": lambda go2: go2.take_over(),
 }
 """What happens for a name; ``up`` and ``stand`` are the same."""
-COMMANDS = (*ORDERS, STOP, DAMP)
-"""All names, those of the course package's interface first."""
-Jobs = JobServer[GO2Controller]
-"""The job server of a robot that ROS 2 drives."""
+COMMANDS = (*ORDERS, STOP, DAMP)  #: All names, those of the course package's interface first
+Jobs = JobServer[GO2Controller]  #: The job server of a robot that ROS 2 drives
 
 
 def order(jobs: Jobs, command: str, reply: Reply) -> None:

@@ -17,14 +17,10 @@ from go2_wbc.errors import BridgeError, MissingDependency
 from go2_wbc.planning.command import VelocityCommand, finite_number
 from go2_wbc.robot.state import RobotState
 
-ANSWER_LIMIT = 30.0
-"""Time [s] in which a behaviour must be answered; the longest one takes four."""
-MOTION_LIMIT = 180.0
-"""Time [s] in which a motion must be over."""
-ODOM_LIMIT = 2.0
-"""Time [s] without odometry after which a goal is given up."""
-SLICE = 0.1
-"""Time [s] between two looks whether the server is still there."""
+ANSWER_LIMIT = 30.0  #: Time [s] in which a behaviour must be answered; the longest one takes four
+MOTION_LIMIT = 180.0  #: Time [s] in which a motion must be over
+ODOM_LIMIT = 2.0  #: Time [s] without odometry after which a goal is given up
+SLICE = 0.1  #: Time [s] between two looks whether the server is still there
 REST_SPEED, REST_TIME, REST_LIMIT = 0.02, 0.3, 4.0
 """A robot rests once it has been slower than this [m/s] for this long [s]; it gets so long [s]."""
 

@@ -9,28 +9,16 @@ from typing import Any
 
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.client import GO2ControllerNode
-from controller.demo.steps import (
-    DEMO_STEPS,
-    FORWARD_SPEED,
-    FORWARD_TIME,
-    TURN_ANGLE,
-    DemoStep,
-    Measurement,
-    StepResult,
-)
+from controller.demo import steps
 from controller.modes import HEIGHT_TOLERANCE
 from controller.navigation import HEADING_TOLERANCE
-from go2_wbc.robot.profile import find_profile
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.state import RobotState
 
-STAND_HEIGHT = 0.31
-"""Height [m] of the base when standing; the CoM is 2 cm lower."""
-WAY_TOLERANCE = 0.06
-"""Accepted error [m] of the way: commands travel through two processes."""
-TURN_TOLERANCE = 2.0 * math.degrees(HEADING_TOLERANCE)
-"""Accepted error [deg] of the turn."""
-REST_SPEED = 0.05
-"""Speed [m/s] below which the robot rests."""
+STAND_HEIGHT = 0.31  #: Height [m] of the base when standing; the CoM is 2 cm lower
+WAY_TOLERANCE = 0.06  #: Accepted error [m] of the way: commands travel through two processes
+TURN_TOLERANCE = 2.0 * math.degrees(HEADING_TOLERANCE)  #: Accepted error [deg] of the turn
+REST_SPEED = 0.05  #: Speed [m/s] below which the robot rests
 
 
 def _height(_before: RobotState, after: RobotState) -> float:
@@ -55,9 +43,9 @@ _FIGURES: Mapping[str, tuple[str, Callable[[RobotState, RobotState], float], str
     "stand": _STANDING,
     "sit": _SITTING,
     "walk": _STANDING,
-    "forward": ("way", _way, "m", FORWARD_SPEED * FORWARD_TIME, WAY_TOLERANCE),
+    "forward": ("way", _way, "m", steps.FORWARD_SPEED * steps.FORWARD_TIME, WAY_TOLERANCE),
     "stop": ("speed at the end", _speed, "m/s", 0.0, REST_SPEED),
-    "turn": ("turned left", _turned, "deg", math.degrees(TURN_ANGLE), TURN_TOLERANCE),
+    "turn": ("turned left", _turned, "deg", math.degrees(steps.TURN_ANGLE), TURN_TOLERANCE),
     "high_five": _STANDING,
     "sit_again": _SITTING,
 }
@@ -65,8 +53,8 @@ _FIGURES: Mapping[str, tuple[str, Callable[[RobotState, RobotState], float], str
 
 
 def run_ros_demo(
-    namespace: str = "robot1", on_step: Callable[[StepResult], None] = lambda _result: None
-) -> tuple[StepResult, ...]:
+    namespace: str = "robot1", on_step: Callable[[steps.StepResult], None] = lambda _result: None
+) -> tuple[steps.StepResult, ...]:
     """Run the demo on the server of ``namespace``.
 
     Raises:
@@ -84,25 +72,27 @@ def run_ros_demo(
 
 
 def run_steps(
-    go2: GO2ControllerNode, on_step: Callable[[StepResult], None] = lambda _result: None
-) -> tuple[StepResult, ...]:
+    go2: GO2ControllerNode, on_step: Callable[[steps.StepResult], None] = lambda _result: None
+) -> tuple[steps.StepResult, ...]:
     """Run the steps on a client; the robot's server is asked, odometry is believed."""
     results = []
-    for step in DEMO_STEPS:
+    for step in steps.DEMO_STEPS:
         results.append(_run_step(go2, step))
         on_step(results[-1])
     return tuple(results)
 
 
-def _run_step(go2: Any, step: DemoStep) -> StepResult:  # the client has the controller's methods
+def _run_step(
+    go2: Any, step: steps.DemoStep
+) -> steps.StepResult:  # the client has the controller's methods
     before, wall = go2.state(), time.monotonic()
     done = before is not None and step.act(go2) is not False
     after = go2.state()
     if before is None or after is None:
         reason, start, duration = f"no odometry of /{go2.namespace}", 0.0, time.monotonic() - wall
-        return StepResult(step.name, step.label, False, reason, start, duration)
+        return steps.StepResult(step.name, step.label, False, reason, start, duration)
     name, seen, unit, asked, tolerance = _FIGURES[step.name]
-    figure = Measurement(name, seen(before, after), unit, asked, tolerance)
+    figure = steps.Measurement(name, seen(before, after), unit, asked, tolerance)
     reason = go2.last_message if not done else "done" if figure.is_met else str(figure)
     ok, duration = done and figure.is_met, after.time - before.time
-    return StepResult(step.name, step.label, ok, reason, before.time, duration, (figure,))
+    return steps.StepResult(step.name, step.label, ok, reason, before.time, duration, (figure,))

@@ -8,8 +8,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from go2_wbc.errors import MissingDependency
-from go2_wbc.extras import install_line
+from go2_wbc.errors import MissingDependency, install_line
 
 INSTALL = install_line("ros2")
 BUILD = "ros2/build_interfaces.sh python3 dist && python -m pip install dist/*.whl"
@@ -18,8 +17,7 @@ PROFILE_VARIABLE, JAZZY_PROFILE_VARIABLE = (
     "FASTRTPS_DEFAULT_PROFILES_FILE",
 )
 """What names a profile to Fast DDS; the one of Kilted complains about the name of Jazzy."""
-KILTED = 9
-"""Major version of rclpy from which on the distribution is Kilted or newer; Jazzy has 7."""
+KILTED = 9  #: Major version of rclpy from which on the distribution is Kilted or newer; Jazzy has 7
 
 
 def profile_variable() -> str:

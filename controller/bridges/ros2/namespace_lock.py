@@ -19,8 +19,7 @@ from go2_wbc.errors import BridgeError
 
 _log = logging.getLogger(__name__)
 
-DISCOVERY = 1.2
-"""Time [s] that other nodes get to be found before the robot is served."""
+DISCOVERY = 1.2  #: Time [s] that other nodes get to be found before the robot is served
 LEASE = 6.0
 """Time [s] after which the graph has forgotten a process that was killed; four, and some."""
 PERIOD = 5.0

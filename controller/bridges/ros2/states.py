@@ -21,12 +21,10 @@ from go2_wbc.robot.state import RobotState
 
 _log = logging.getLogger(__name__)
 
-QUEUE = 10
-"""Messages that are kept for a slow reader."""
+QUEUE = 10  #: Messages that are kept for a slow reader
 STATE_RATE, TRANSFORM_RATE = 100.0, 50.0
 """Messages per second of robot time: of what is measured, and of /tf."""
-FEET_ORDER = (Leg.FR, Leg.FL, Leg.RR, Leg.RL)
-"""The order of the feet in ``RobotFootContact``."""
+FEET_ORDER = (Leg.FR, Leg.FL, Leg.RR, Leg.RL)  #: The order of the feet in ``RobotFootContact``
 _NOISE, _ERRORS, _FILTER = SensorNoise(), SensorErrors(), EstimatorConfig()
 IMU_DEVIATIONS: Mapping[str, tuple[float, float, float]] = {
     "ideal": (1e-3, 1e-3, 1e-2),
@@ -37,8 +35,7 @@ IMU_DEVIATIONS: Mapping[str, tuple[float, float, float]] = {
 not 0 with ideal ones, since many filters take 0 for unknown."""
 
 
-Fill = Callable[[Any, RobotState, Any], None]
-"""Writes a state and its stamp into a message."""
+Fill = Callable[[Any, RobotState, Any], None]  #: Writes a state and its stamp into a message
 
 
 @dataclass(slots=True)
@@ -53,11 +50,7 @@ class _Stream:
 
 
 class StatePublisher:
-    """Publishes the state of one robot.
-
-    Attributes:
-        counts: messages published so far, by topic.
-    """
+    """Publishes the state of one robot."""
 
     def __init__(
         self, node: Any, simulator: MujocoPlant, *, realtime: bool, sensors: str = "ideal"
@@ -71,7 +64,7 @@ class StatePublisher:
             sensors: of the simulator, which say the variances of its IMU.
         """
         self._node, self._simulator, self._realtime = node, simulator, realtime
-        self.counts: dict[str, int] = {}
+        self.counts: dict[str, int] = {}  #: messages published so far, by topic
         self._streams: list[_Stream] = []
         namespace = node.get_namespace().removeprefix("/")
         base, odom = f"{namespace}/base_link", f"{namespace}/odom"

@@ -17,8 +17,7 @@ from go2_wbc.robot.rotations import rpy_from_quaternion
 
 _log = logging.getLogger(__name__)
 
-CMD_VEL_SILENCE = 0.5
-"""Robot time [s] without a command after which the robot stops."""
+CMD_VEL_SILENCE = 0.5  #: Robot time [s] without a command after which the robot stops
 
 
 class VelocityInput:

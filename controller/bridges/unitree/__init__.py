@@ -8,8 +8,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-from go2_wbc.errors import MissingDependency
-from go2_wbc.extras import install_line
+from go2_wbc.errors import MissingDependency, install_line
 
 LOOPBACK = "lo0" if sys.platform == "darwin" else "lo"
 """Where simulators live, which need not have a motion switcher; a robot has one."""

@@ -48,8 +48,7 @@ _CONFIG: Final = (
 )
 _domains: dict[int, tuple[str, Any]] = {}
 _lock = threading.Lock()
-DOMAINS: Final = 230
-"""Numbers of DDS domains that every system's ports have room for, from 0 on."""
+DOMAINS: Final = 230  #: Numbers of DDS domains that every system's ports have room for, from 0 on
 
 
 @final

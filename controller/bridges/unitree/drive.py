@@ -13,12 +13,9 @@ from go2_wbc.config import Config
 from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
 from go2_wbc.validation import FINITE, POSITIVE, ranged
 
-SETTLE: Final = 1.5
-"""Time [s] of a trot before its speed is measured."""
-SAMPLE: Final = 0.02
-"""Time [s] between two samples of the speed."""
-REST: Final = 0.5
-"""Time [s] of standing still after a trot."""
+SETTLE: Final = 1.5  #: Time [s] of a trot before its speed is measured
+SAMPLE: Final = 0.02  #: Time [s] between two samples of the speed
+REST: Final = 0.5  #: Time [s] of standing still after a trot
 
 
 @dataclass(frozen=True, slots=True)

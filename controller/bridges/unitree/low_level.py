@@ -19,7 +19,7 @@ from typing import Final, final
 import numpy as np
 from jaxtyping import Float, Shaped
 
-from controller.behaviours.joints import DAMPING
+from controller.behaviours import DAMPING
 from controller.bridges.unitree import messages
 from controller.bridges.unitree.messages import FEET_SWAPPED, JOINTS_SWAPPED, MOTORS, decode_message
 from controller.pacing import LogThrottle
@@ -32,14 +32,10 @@ from go2_wbc.validation import POSITIVE, ranged
 
 _log = logging.getLogger(__name__)
 
-SILENCE: Final = 0.05
-"""Time [s] without a good command after which the robot is damped."""
-RELEASE: Final = 0.5
-"""Time [s] without a good command after which low-level control has ended."""
-ANGLE_MARGIN: Final = 0.1
-"""Angle [rad] by which a desired angle may lie beyond the joint's limit."""
-REPORT_PERIOD: Final = 1.0
-"""Time [s] between two reports of the same kind."""
+SILENCE: Final = 0.05  #: Time [s] without a good command after which the robot is damped
+RELEASE: Final = 0.5  #: Time [s] without a good command after which low-level control has ended
+ANGLE_MARGIN: Final = 0.1  #: Angle [rad] by which a desired angle may lie beyond the joint's limit
+REPORT_PERIOD: Final = 1.0  #: Time [s] between two reports of the same kind
 
 
 def intact_message(kind: np.dtype[np.void], data: bytes) -> Shaped[np.ndarray, "1"]:
@@ -148,13 +144,7 @@ def as_it_says(
 
 @final
 class CommandGate:
-    """Decides, tick by tick, whether the motors obey ``rt/lowcmd`` or the controller's own command.
-
-    Attributes:
-        is_open: whether low-level commands may take the robot over.
-        accepted: number of good commands.
-        refused: number of refused ones by reason.
-    """
+    """Decides in each tick whether motors obey ``rt/lowcmd`` or the controller's own command."""
 
     def __init__(
         self,
@@ -163,9 +153,9 @@ class CommandGate:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """Guard joints with these limits [rad]; ``clock`` tells the wall clock's seconds."""
-        self.is_open = True
-        self.accepted = 0
-        self.refused: Counter[str] = Counter()
+        self.is_open = True  #: whether low-level commands may take the robot over
+        self.accepted = 0  #: number of good commands
+        self.refused: Counter[str] = Counter()  #: number of refused ones, by reason
         self._lower, self._upper, self._clock = lower, upper, clock
         self._last: JointCommand | None = None
         self._heard = -np.inf
@@ -274,7 +264,6 @@ class Guards:
     """Judges states and softens commands for one robot."""
 
     def __init__(self, model: RobotModel, config: GuardConfig) -> None:
-        """Guard ``model``'s robot."""
         self._config = config
         limits = model.pin_model
         self._lower = np.array(limits.lowerPositionLimit[7:])

@@ -30,18 +30,12 @@ FEET_SWAPPED: Final = np.array([Leg.FR, Leg.FL, Leg.RR, Leg.RL])
 JOINTS_SWAPPED: Final = np.array([3 * leg + part for leg in FEET_SWAPPED for part in range(3)])
 """Take a per-leg array, or one of twelve joints or motors, from our order into Unitree's, and back:
 both orders differ in left and right only."""
-MOTORS: Final = 12
-"""Motors that exist; a message has room for twenty."""
-HEAD: Final = (0xFE, 0xEF)
-"""First bytes of every low-level message."""
-LOW_LEVEL: Final = 0xFF
-"""``level_flag`` of low-level control."""
-SERVO: Final = 0x01
-"""``mode`` of a motor that obeys: field-oriented control."""
-POSITION_STOP: Final = 2.146e9
-"""A desired angle that means: no position control (``PosStopF``)."""
-VELOCITY_STOP: Final = 16000.0
-"""A desired speed that means: no speed control (``VelStopF``)."""
+MOTORS: Final = 12  #: Motors that exist; a message has room for twenty
+HEAD: Final = (0xFE, 0xEF)  #: First bytes of every low-level message
+LOW_LEVEL: Final = 0xFF  #: ``level_flag`` of low-level control
+SERVO: Final = 0x01  #: ``mode`` of a motor that obeys: field-oriented control
+POSITION_STOP: Final = 2.146e9  #: A desired angle that means: no position control (``PosStopF``)
+VELOCITY_STOP: Final = 16000.0  #: A desired speed that means: no speed control (``VelStopF``)
 KP_MAX, KD_MAX = 500.0, 50.0
 TAU_MAX, SPEED_MAX = 100.0, 100.0
 
@@ -91,8 +85,7 @@ def _layout(name: str) -> np.dtype[np.void]:
 
 LOW_STATE: Final = _layout("LowState_")
 LOW_CMD: Final = _layout("LowCmd_")
-SPORT_STATE: Final = _layout("SportModeState_")
-"""``rt/sportmodestate``; it carries no checksum."""
+SPORT_STATE: Final = _layout("SportModeState_")  #: ``rt/sportmodestate``; it carries no checksum
 
 
 _MIRRORED: Final = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
@@ -121,11 +114,9 @@ def is_intact(message: Shaped[np.ndarray, "1"]) -> bool:
     return int(message["crc"][0]) == checksum(message)
 
 
-LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
-"""Encapsulation header of little-endian CDR."""
+LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"  #: Encapsulation header of little-endian CDR
 _LENGTH: Final = struct.Struct("<I")
-_SPARE: Final = np.uint8(0)
-"""Stands at the end for every byte that the other side does not have."""
+_SPARE: Final = np.uint8(0)  #: Stands at the end for every byte that the other side does not have
 
 
 def encode_message(message: Shaped[np.ndarray, "1"]) -> bytes:
@@ -168,21 +159,13 @@ def _byte_maps(layout: np.dtype[np.void]) -> tuple[Int[np.ndarray, " n"], Int[np
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A remote procedure call.
+    """A remote procedure call."""
 
-    Attributes:
-        id: chosen by the client, repeated in the response.
-        api_id: which procedure.
-        lease_id: of a client that asked for sole control, else 0.
-        is_one_way: whether the client waits for no response.
-        parameter: JSON, or empty.
-    """
-
-    id: int
-    api_id: int
-    lease_id: int = 0
-    is_one_way: bool = False
-    parameter: str = ""
+    id: int  #: chosen by the client, repeated in the response
+    api_id: int  #: which procedure
+    lease_id: int = 0  #: of a client that asked for sole control, else 0
+    is_one_way: bool = False  #: whether the client waits for no response
+    parameter: str = ""  #: JSON, or empty
 
 
 @dataclass(frozen=True, slots=True)

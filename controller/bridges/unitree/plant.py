@@ -14,22 +14,11 @@ from typing import TYPE_CHECKING, Final, final
 
 import numpy as np
 
-from controller.behaviours.joints import DAMPING
-from controller.bridges.unitree import LOOPBACK, require_dds
-from controller.bridges.unitree.low_level import (
-    GuardConfig,
-    Guards,
-    as_it_says,
-    intact_message,
-    is_passive,
-    low_cmd_message,
-    require_sane,
-    sensor_reading,
-)
+from controller.behaviours import DAMPING
+from controller.bridges.unitree import LOOPBACK, low_level, require_dds
 from controller.bridges.unitree.messages import LOW_STATE, encode_message
 from controller.bridges.unitree.sport_api import SWITCHER_SERVICE, Code, SwitcherApi
-from controller.errands import BackgroundLog
-from controller.pacing import SWITCH_INTERVAL
+from controller.pacing import SWITCH_INTERVAL, BackgroundLog
 from go2_wbc.errors import ClosedError, CommandError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.estimator import EstimatorConfig, StateEstimator
@@ -42,16 +31,13 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-PERIOD: Final = 0.002
-"""Seconds between two ``rt/lowstate`` of the robot."""
-FIRST_STATE_LIMIT: Final = 5.0
-"""Time [s] in which the robot must be found."""
+PERIOD: Final = 0.002  #: Seconds between two ``rt/lowstate`` of the robot
+FIRST_STATE_LIMIT: Final = 5.0  #: Time [s] in which the robot must be found
 QUEUE: Final = 64
 """States that are kept while the controller is busy; the estimator takes in all of them."""
 EXIT_DAMPINGS, DAMPING_PERIOD = 40, 0.005
 """How often damping is sent at the end, and the time [s] between two of these commands: 0.2 s."""
-WATCH: Final = 0.02
-"""Time [s] between two looks whether the controller still sends commands."""
+WATCH: Final = 0.02  #: Time [s] between two looks whether the controller still sends commands
 SYNC_TRIES, SYNC_LIMIT, SYNC_SILENCE = 5, 0.1, 0.02
 """How often, and how long each time [s], the plant tries to get into step with the robot, and the
 silence [s] that shows that it has."""
@@ -59,8 +45,7 @@ REPEAT, REPEATS = 0.01, 10
 """Silence [s] of the robot after which a command is sent again, and how often at most until the
 limit of stale states: it, or its answer, may be lost, and a simulator in lockstep waits for it. One
 that is only slow takes the repetition for the next command: where more is allowed, wait longer."""
-SWITCHER_LIMIT: Final = 1.0
-"""Time [s] in which the robot's motion switcher must be found."""
+SWITCHER_LIMIT: Final = 1.0  #: Time [s] in which the robot's motion switcher must be found
 RELEASE_LIMIT, RELEASE_PERIOD = 5.0, 0.2
 """Time [s] in which its motion service must let go, and between two requests to."""
 CONSENT: Final = (
@@ -93,7 +78,7 @@ class UnitreePlant(Plant):
         domain: int = 0,
         *,
         i_have_the_remote_in_hand: bool = False,
-        guards: GuardConfig | None = None,
+        guards: low_level.GuardConfig | None = None,
         estimator: EstimatorConfig | None = None,
     ) -> None:
         """Find the robot, make sure that it lies, and take it over from its sport service.
@@ -118,9 +103,9 @@ class UnitreePlant(Plant):
         from controller.bridges.unitree.bus import Bus
 
         model = RobotModel()
-        self._config = guards or GuardConfig()
+        self._config = guards or low_level.GuardConfig()
         self._repeat = max(REPEAT, self._config.stale_limit / REPEATS)
-        self._guards = Guards(model, self._config)
+        self._guards = low_level.Guards(model, self._config)
         # Nobody watches the sensors: how sound ones of a real robot read is not known well enough.
         self._estimator = StateEstimator(model, estimator, watches=False)
         self._model = model
@@ -181,14 +166,14 @@ class UnitreePlant(Plant):
             PlantError: if a guard trips; the robot is damped.
         """
         self._check_open()
-        require_sane(command)
+        low_level.require_sane(command)
         self._send_softened(command)
         while not self._hears_a_state():
             self._send_softened(command)
 
     def _send_softened(self, command: JointCommand) -> None:
         with self._sending:
-            if not is_passive(command):
+            if not low_level.is_passive(command):
                 self._require_sound()
             self._send(self._guards.soften(command, self._state))
 
@@ -218,8 +203,8 @@ class UnitreePlant(Plant):
 
     def _send(self, command: JointCommand) -> None:
         with self._sending:
-            self._commands.write(encode_message(low_cmd_message(command)))
-            self._written = math.inf if is_passive(command) else time.monotonic()
+            self._commands.write(encode_message(low_level.low_cmd_message(command)))
+            self._written = math.inf if low_level.is_passive(command) else time.monotonic()
 
     def _damp_once(self) -> None:
         try:
@@ -305,7 +290,7 @@ class UnitreePlant(Plant):
         known = self._tick
         for data in self._states.take():
             try:
-                message = intact_message(LOW_STATE, data)
+                message = low_level.intact_message(LOW_STATE, data)
             except CommandError:
                 self.bad_states += 1
                 continue
@@ -314,9 +299,9 @@ class UnitreePlant(Plant):
                 raise self._stop(PlantError("the robot's clock went back: it has started anew"))
             if tick > self._tick:
                 self._tick, self._heard = tick, time.monotonic()
-                reading = sensor_reading(message)
+                reading = low_level.sensor_reading(message)
                 self._state = self._estimator.update(reading)
-                self._own_view = as_it_says(self._state, reading, message)
+                self._own_view = low_level.as_it_says(self._state, reading, message)
         return self._tick > known
 
     # --- taking over ----------------------------------------------------------------------

@@ -18,12 +18,9 @@ from go2_wbc.errors import CommandError
 
 _log = logging.getLogger(__name__)
 
-PATROL: Final = 0.02
-"""Time [s] after which a server without requests looks after what is pending."""
-QUEUE: Final = 64
-"""Requests that are kept for a server that is busy; of more, the oldest are lost."""
-TRIES: Final = 3
-"""How often a question is asked before silence is taken for an answer."""
+PATROL: Final = 0.02  #: Time [s] after which a server without requests looks after what is pending
+QUEUE: Final = 64  #: Requests that are kept for a server that is busy; of more, the oldest are lost
+TRIES: Final = 3  #: How often a question is asked before silence is taken for an answer
 
 
 @final
@@ -91,7 +88,6 @@ class Lease:
     """Gives one client at a time the sole control of a service, as Unitree's servers do."""
 
     def __init__(self) -> None:
-        """Nobody has it."""
         self._id, self._renewed = 0, -math.inf
 
     def allows(self, request: Request) -> bool:
@@ -123,7 +119,6 @@ class Client:
     """Calls one service; one call at a time."""
 
     def __init__(self, bus: Bus, service: str) -> None:
-        """Call ``service``."""
         self._writer = bus.writer(f"rt/api/{service}/request")
         self._reader = bus.reader(f"rt/api/{service}/response", depth=QUEUE, reliable=True)
 

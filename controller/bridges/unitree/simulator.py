@@ -13,18 +13,11 @@ from typing import Final, final
 import numpy as np
 from jaxtyping import Shaped
 
-from controller.bridges.unitree import LOOPBACK, messages
+from controller.bridges.unitree import LOOPBACK, messages, sport_api
 from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.low_level import CommandGate, fill_imu, low_state_message
 from controller.bridges.unitree.messages import Reply, Request, encode_message
 from controller.bridges.unitree.rpc import Lease, Server
-from controller.bridges.unitree.sport_api import (
-    SPORT_SERVICE,
-    SWITCHER_SERVICE,
-    Code,
-    SportStatus,
-    SwitcherApi,
-)
 from controller.bridges.unitree.sport_robot import SportRobot
 from controller.bridges.unitree.sport_service import SportService
 from controller.pacing import SWITCH_INTERVAL, Pacer
@@ -39,8 +32,7 @@ _log = logging.getLogger(__name__)
 
 DISCOVERY: Final = 0.5
 """Time [s] that another robot gets to be heard; some hundredths on an idle machine."""
-SPORT_STATE_TICKS: Final = 10
-"""Control periods between two samples of ``rt/sportmodestate``."""
+SPORT_STATE_TICKS: Final = 10  #: Control periods between two samples of ``rt/sportmodestate``
 COMMAND_QUEUE: Final = 512
 """Low-level commands that are looked at in one tick; of more, the oldest are lost. Garbage at 5 kHz
 must not push out the good ones while a process is paused for a moment."""
@@ -80,11 +72,7 @@ class SimulatorSettings:
 
 @final
 class UnitreeSimulator:
-    """Serves a simulated robot until it is closed.
-
-    Attributes:
-        gate: who has the motors, with the counts of good and refused commands.
-    """
+    """Serves a simulated robot until it is closed."""
 
     def __init__(self, settings: SimulatorSettings) -> None:
         """Start serving.
@@ -107,16 +95,16 @@ class UnitreeSimulator:
             estimator=config.estimator,
         )
         model = RobotModel()
-        self.gate = CommandGate(model.q_lower, model.q_upper)
+        self.gate = CommandGate(model.q_lower, model.q_upper)  #: who has the motors
         self._plant = ServedPlant(inner, bus, self.gate, lockstep=settings.lockstep)
         self._robot = SportRobot(self._plant, config)
         self._is_released = False
         self._sport = SportService(self._robot, lambda: self._is_released or self.gate.is_active)
         self._lease = Lease()
         self._servers = (
-            Server(bus, SPORT_SERVICE, self._handle_sport, self._patrol),
-            Server(bus, f"{SPORT_SERVICE}_lease", self._lease.handle),
-            Server(bus, SWITCHER_SERVICE, self._handle_switcher),
+            Server(bus, sport_api.SPORT_SERVICE, self._handle_sport, self._patrol),
+            Server(bus, f"{sport_api.SPORT_SERVICE}_lease", self._lease.handle),
+            Server(bus, sport_api.SWITCHER_SERVICE, self._handle_switcher),
         )
 
     @property
@@ -141,21 +129,21 @@ class UnitreeSimulator:
         if self._lease.allows(request):
             self._sport.handle(request, reply)
         else:
-            reply(Code.LEASE_DENIED, "")
+            reply(sport_api.Code.LEASE_DENIED, "")
 
     def _handle_switcher(self, request: Request, reply: Reply) -> None:
         """Hands the robot to low-level control and back, as ``MotionSwitcherClient`` asks."""
-        if request.api_id == SwitcherApi.CHECK_MODE:
+        if request.api_id == sport_api.SwitcherApi.CHECK_MODE:
             name = "" if self._is_released else "normal"
-            reply(Code.OK, json.dumps({"form": "0", "name": name}))
-        elif request.api_id == SwitcherApi.RELEASE_MODE:
+            reply(sport_api.Code.OK, json.dumps({"form": "0", "name": name}))
+        elif request.api_id == sport_api.SwitcherApi.RELEASE_MODE:
             self._is_released = self._is_released or self._sport.is_idle
-            reply(Code.OK if self._is_released else Code.NOT_READY, "")
-        elif request.api_id == SwitcherApi.SELECT_MODE:
+            reply(sport_api.Code.OK if self._is_released else sport_api.Code.NOT_READY, "")
+        elif request.api_id == sport_api.SwitcherApi.SELECT_MODE:
             self._is_released = False
-            reply(Code.OK, "")
+            reply(sport_api.Code.OK, "")
         else:
-            reply(Code.NOT_SUPPORTED, "")
+            reply(sport_api.Code.NOT_SUPPORTED, "")
 
 
 def _require_no_robot(domain: int, interface: str) -> None:
@@ -182,7 +170,7 @@ class ServedPlant(Plant):
     ) -> None:
         """Serve ``inner`` on ``bus``; with ``lockstep`` time waits for the low-level peer."""
         self._is_lockstep = lockstep
-        self.gate, self.status = gate, SportStatus()
+        self.gate, self.status = gate, sport_api.SportStatus()
         self._inner = inner
         self._commands = bus.reader("rt/lowcmd", depth=COMMAND_QUEUE)
         self._states = bus.writer("rt/lowstate")
@@ -227,7 +215,7 @@ class ServedPlant(Plant):
 
 
 def sport_state_message(
-    state: RobotState, imu: ImuSample, status: SportStatus
+    state: RobotState, imu: ImuSample, status: sport_api.SportStatus
 ) -> Shaped[np.ndarray, "1"]:
     """``rt/sportmodestate``: position, velocity in the world, what the sport service is doing."""
     message = np.zeros(1, messages.SPORT_STATE)

@@ -20,8 +20,7 @@ from go2_wbc.errors import CommandError
 SPORT_SERVICE: Final = "sport"
 SWITCHER_SERVICE: Final = "motion_switcher"
 API_VERSION: Final = "1.0.0.1"
-LEASE_TERM: Final = 1.0
-"""Time [s] for which a lease holds without renewal."""
+LEASE_TERM: Final = 1.0  #: Time [s] for which a lease holds without renewal
 
 
 class Api(IntEnum):
@@ -106,31 +105,21 @@ class SportMode(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class SportStatus:
-    """What the sport service says of itself in ``rt/sportmodestate``.
+    """What the sport service says of itself in ``rt/sportmodestate``."""
 
-    Attributes:
-        mode: see ``SportMode``.
-        is_acting: whether an action is running.
-        is_trotting: whether the robot is in walking mode.
-        error_code: of the last action that failed, 0 since one was done.
-    """
-
-    mode: SportMode = SportMode.DAMPING
-    is_acting: bool = False
-    is_trotting: bool = False
-    error_code: int = 0
+    mode: SportMode = SportMode.DAMPING  #: see ``SportMode``
+    is_acting: bool = False  #: whether an action is running
+    is_trotting: bool = False  #: whether the robot is in walking mode
+    error_code: int = 0  #: of the last action that failed, 0 since one was done
 
 
 MOVE_LEAST, MOVE_GREATEST = (-2.5, -1.0, -4.0), (3.8, 1.0, 4.0)
 """Of ``Move``: forward, left [m/s], turning left [rad/s]."""
-HEIGHT_LEAST, HEIGHT_GREATEST = -0.18, 0.03
-"""Of ``BodyHeight``: from the usual height [m]."""
-EULER_LIMITS: Final = (0.75, 0.75, 0.6)
-"""Of ``Euler``: roll, pitch, yaw [rad], either way."""
+HEIGHT_LEAST, HEIGHT_GREATEST = -0.18, 0.03  #: Of ``BodyHeight``: from the usual height [m]
+EULER_LIMITS: Final = (0.75, 0.75, 0.6)  #: Of ``Euler``: roll, pitch, yaw [rad], either way
 SPEED_LEVELS: Final[Mapping[int, float]] = {-1: 0.4, 0: 0.7, 1: 1.0}
 """Share of the walking envelope for ``Move``, by ``SpeedLevel``; ours, not the firmware's."""
-FAR: Final = 1e6
-"""No number of a parameter is as large: a mistake, infinity or not a number."""
+FAR: Final = 1e6  #: No number of a parameter is as large: a mistake, infinity or not a number
 PATH_POINTS: Final = 30
 """Points of a path: unitree_sdk2_python sends as many (``SPORT_PATH_POINT_SIZE``)."""
 PATH_FIELDS: Final = ("t_from_start", "x", "y", "yaw", "vx", "vy", "vyaw")

@@ -51,17 +51,12 @@ WALKS: Final[Mapping[int, str]] = {
     Api.FREE_BOUND: "bound",
 }
 """The gait that stands for each of Unitree's, if there is one of that name."""
-WALKING: Final = frozenset({Api.MOVE, *WALKS})
-"""What enters walking mode, or stays in it."""
+WALKING: Final = frozenset({Api.MOVE, *WALKS})  #: What enters walking mode, or stays in it
 STANDING_UP: Final = frozenset({Api.STAND_UP, Api.BALANCE_STAND, Api.RECOVERY_STAND})
-POSE: Final = (0.12, -0.15, 0.2)
-"""Roll, pitch, yaw [rad] of ``Pose``."""
-FINDINGS_TOLD: Final = 3
-"""Findings of the feasibility check that a refusal names."""
-ATTITUDE_TOLERANCE: Final = 0.06
-"""Angle [rad] from the asked attitude that still counts as there."""
-LEAN_TIME, LEAN_LIMIT = 1.0, 2.0
-"""Time [s] that leaning takes, and may take at most."""
+POSE: Final = (0.12, -0.15, 0.2)  #: Roll, pitch, yaw [rad] of ``Pose``
+FINDINGS_TOLD: Final = 3  #: Findings of the feasibility check that a refusal names
+ATTITUDE_TOLERANCE: Final = 0.06  #: Angle [rad] from the asked attitude that still counts as there
+LEAN_TIME, LEAN_LIMIT = 1.0, 2.0  #: Time [s] that leaning takes, and may take at most
 ARRIVAL_TIME: Final = 2.0
 """Time [s] after its last point that a robot gets to reach it: own choice."""
 NEAR_PLACE, NEAR_ANGLE = 0.02, math.radians(1.5)
@@ -81,7 +76,6 @@ class SportRobot:
     """
 
     def __init__(self, plant: Plant, config: Config) -> None:
-        """Take over a robot that lies on the ground."""
         self._config = config = config.beside_hardware
         # With a model of its own: the loop is another thread.
         self._checker = FeasibilityChecker(RobotModel(motor=config.motor), config.feasibility)

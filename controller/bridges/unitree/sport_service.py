@@ -16,17 +16,9 @@ from typing import Final, final
 
 import numpy as np
 
-from controller.bridges.unitree import sport_api
+from controller.bridges.unitree import sport_api, sport_robot
 from controller.bridges.unitree.messages import Reply, Request
 from controller.bridges.unitree.sport_api import Api, Code, SportMode, SportStatus
-from controller.bridges.unitree.sport_robot import (
-    MOTIONS,
-    POSE,
-    STANDING_UP,
-    WALKS,
-    SportPath,
-    SportRobot,
-)
 from controller.jobs import Job, JobServer
 from controller.modes import Aborted, Measurements, Mode, Outcome
 from controller.pacing import LogOnce
@@ -36,12 +28,9 @@ from go2_wbc.planning.trunk import BodyPose
 
 _log = logging.getLogger(__name__)
 
-PATIENCE: Final = 0.8
-"""Time [s] after which a request is answered at the latest."""
-HOLD: Final = 1.0
-"""Time [s] for which a ``Move`` holds."""
-WAITING: Final = 8
-"""Requests that may wait for the running action."""
+PATIENCE: Final = 0.8  #: Time [s] after which a request is answered at the latest
+HOLD: Final = 1.0  #: Time [s] for which a ``Move`` holds
+WAITING: Final = 8  #: Requests that may wait for the running action
 _KNOWN: Final = frozenset(map(int, Api))
 _AT_ONCE: Final = frozenset(
     {
@@ -64,9 +53,9 @@ _ENTRY: Final = {
     Api.EULER: _ON_FEET,
     Api.POSE: _ON_FEET,
     Api.MOVE: _ON_FEET,
-    **dict.fromkeys(WALKS, _ON_FEET),
+    **dict.fromkeys(sport_robot.WALKS, _ON_FEET),
     Api.RECOVERY_STAND: frozenset(Mode),
-    **dict.fromkeys(MOTIONS, _ON_FEET),
+    **dict.fromkeys(sport_robot.MOTIONS, _ON_FEET),
 }
 """Modes from which an action may begin; one that is not listed: from all but fallen."""
 
@@ -75,14 +64,14 @@ _ENTRY: Final = {
 class SportService:
     """Turns requests into actions of one robot."""
 
-    def __init__(self, robot: SportRobot, is_released: Callable[[], bool]) -> None:
+    def __init__(self, robot: sport_robot.SportRobot, is_released: Callable[[], bool]) -> None:
         """Serve ``robot`` unless ``is_released()`` says that low-level commands have it."""
         self._robot, self._is_released = robot, is_released
         self._jobs = JobServer(robot, queue=WAITING, patience=PATIENCE)
         self._rising: Api | None = None
         self._lock = threading.Lock()
         self._wanted, self._wanted_until = ZERO_COMMAND, 0.0
-        self._path: SportPath | None = None
+        self._path: sport_robot.SportPath | None = None
         self._level, self._clipped = 0, LogOnce(_log)
         self._recovers = self._has_tried_to_recover = False
         self._jobs.start("sport")
@@ -116,7 +105,7 @@ class SportService:
         elif api is Api.MOVE:
             self._move(sport_api.vector(parameter))
         elif api is Api.TRAJECTORY_FOLLOW:
-            self._path = SportPath(np.array(sport_api.path_points(parameter)))
+            self._path = sport_robot.SportPath(np.array(sport_api.path_points(parameter)))
             self._follow()
         elif api is Api.BODY_HEIGHT:
             return self._raise_to(sport_api.height(parameter)), ""
@@ -148,12 +137,12 @@ class SportService:
             rpy = sport_api.vector(parameter)
             return lambda: self._lean(rpy)
         if api is Api.POSE and sport_api.flag(parameter):
-            return lambda: robot.lean_to(POSE)
+            return lambda: robot.lean_to(sport_robot.POSE)
         if api is Api.POSE or (api is Api.CROSS_STEP and not sport_api.flag(parameter)):
             return lambda: robot.perform(Api.BALANCE_STAND)
         if api is Api.FREE_BOUND and not sport_api.flag(parameter):
             return lambda: robot.perform(Api.TROT_RUN)
-        if api in STANDING_UP:
+        if api in sport_robot.STANDING_UP:
             return lambda: self._rise(api)
         return lambda: robot.perform(api)
 
@@ -174,7 +163,7 @@ class SportService:
     def _joins(self, api: Api) -> bool:
         """Whether a robot that rises anyway needs no other action for ``api``."""
         with self._lock:
-            is_rising = self._rising is not None and api in STANDING_UP
+            is_rising = self._rising is not None and api in sport_robot.STANDING_UP
             if is_rising and api is not Api.STAND_UP:
                 self._rising = api
         return is_rising

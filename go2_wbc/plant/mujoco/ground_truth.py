@@ -14,15 +14,14 @@ from jaxtyping import Bool, Float, Int
 
 from go2_wbc.legs import JOINT_NAMES
 from go2_wbc.plant.base import Plant, Scan
-from go2_wbc.plant.mujoco.contacts import Contacts, foot_contacts, touches_itself
+from go2_wbc.plant.mujoco.forces import Contacts, foot_contacts, touches_itself
 from go2_wbc.plant.mujoco.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand, PartFault, RobotState
 
 FALLEN_TILT = math.radians(60.0)
 """Tilt of the trunk from which on the robot has fallen, whatever the controller thinks."""
-TOUCH = 1.0
-"""Force [N] between trunk and ground that counts as a touch."""
+TOUCH = 1.0  #: Force [N] between trunk and ground that counts as a touch
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +36,7 @@ class TruthRecording:
         tau_asked: those that the command asked for when the tick began [N m], before the motors'
             limits; 0 in a row that no command led to.
         foot_forces: normal forces [N] on the feet.
-        p_world_com: centre of mass [m], by MuJoCo.
-        p_world_feet: centres of the feet [m].
+        p_world_com, p_world_feet: centres of mass and of the feet [m], by MuJoCo.
         p_world_contacts: contact points of the feet [m], nan in the air.
         v_world_contacts: tangential velocity [m/s] of the feet's material there, 0 in the air.
         trunk_force: normal force [N] between the trunk and the ground.
@@ -122,7 +120,6 @@ class GroundTruth(Plant):
     """
 
     def __init__(self, plant: MujocoPlant) -> None:
-        """Record what a controller does to ``plant``."""
         self._plant = plant
         self.robot, self.joint_damping = plant.robot, plant.joint_damping
         joint = plant.model.joint(JOINT_NAMES[0])  # a file of a user may name the base otherwise

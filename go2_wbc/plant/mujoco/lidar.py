@@ -30,8 +30,7 @@ from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
 LEG_RADIUS, LEG_POINTS = 0.04, 4
 """Distance [m] of a ray from the axis of a link that it hits, and points of that axis looked at."""
-ROUNDING = 1e-9
-"""Of a time [s]."""
+ROUNDING = 1e-9  #: Of a time [s]
 GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 
 
@@ -131,8 +130,7 @@ class DepthConfig:
         return rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
 
-PLACE = np.array((0.30, 0.0, -0.03))
-"""Of the lidar, in the base frame [m]."""
+PLACE = np.array((0.30, 0.0, -0.03))  #: Of the lidar, in the base frame [m]
 
 
 def ground_model(terrain: Terrain | None) -> mujoco.MjModel:

@@ -17,20 +17,27 @@ from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, u
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant, Scan
 from go2_wbc.plant.faults import HELD_TIME, Faults, InjectedFault
-from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
-from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN, bin_forces, read_joints
+from go2_wbc.plant.mujoco.forces import (
+    LIMB_BIN,
+    ROBOT_BINS,
+    TRUNK_BIN,
+    Contacts,
+    FootContacts,
+    Pushes,
+    bin_forces,
+    foot_contacts,
+    read_joints,
+)
 from go2_wbc.plant.mujoco.lidar import DepthConfig, LidarConfig, RangeSensor, chosen
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
-from go2_wbc.plant.mujoco.pushes import Pushes
-from go2_wbc.plant.mujoco.settling import settle
-from go2_wbc.plant.mujoco.setup import PlantSetup, SavedPhysics, command_numbers, prepare
+from go2_wbc.plant.mujoco.setup import PlantSetup, SavedPhysics, prepare, settle
 from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors, SensorNoise
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.records import packed
+from go2_wbc.robot.description import GO2
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel, drive
-from go2_wbc.robot.profile import GO2
 from go2_wbc.robot.state import JointCommand, OdometryCovariance, PartFault, RobotState
 from go2_wbc.world import SENSORS
 
@@ -248,13 +255,15 @@ class MujocoPlant(Plant):
             ClosedError: after ``close()``.
         """
         self._check_open()
-        self._waiting.append(command_numbers(command))
+        self._waiting.append(command.numbers())
         if len(self._waiting) > self._late:
             self._acting = self._waiting.popleft()
         model, data = self._model, self._data
-        total, shares = np.zeros(12), self._faults.torque_shares(self.time)
-        for hold in self._faults.begun_holds(self.time, self._period):
-            self._pushes.hold(hold.part, hold.value, HELD_TIME)
+        total, shares = np.zeros(12), None
+        if self._faults.known:
+            shares = self._faults.torque_shares(self.time)
+            for hold in self._faults.begun_holds(self.time, self._period):
+                self._pushes.hold(hold.part, hold.value, HELD_TIME)
         for remaining in range(self._substeps, 0, -1):
             drive(self._acting, *self._motors, total)
             if shares is not None:
@@ -437,7 +446,6 @@ class MujocoPlant(Plant):
         self._closed = True
 
     def __repr__(self) -> str:
-        """What it is, and when."""
         now = "closed" if self._closed else f"{self.time:.3f} s"
         mass = float(self._model.body_subtreemass[self._layout.base])
         return f"<MujocoPlant: {mass:.2f} kg, {now}>"
@@ -452,16 +460,13 @@ class MujocoPlant(Plant):
 
     def _sense(self) -> None:
         """Lets the robot's own sensors read, if it lives on them."""
-        last = self._state, self._imu
+        last, faults = (self._state, self._imu), self._faults
         self._truth, self._state, self._imu = None, None, None
-        if last[0] is not None and self._faults.loses(self.time, self._rng):
+        if faults.known and last[0] is not None and faults.loses(self.time, self._rng):
             self._state, self._imu = last
         elif self._senses is not None:
-            sample = self.truth(), self._true_imu()
-            if self._faults.known:
-                self._state, self._imu = self._senses.sense(*sample, self._faults.broken)
-            else:
-                self._state, self._imu = self._senses.sense(*sample)
+            given = [faults.broken] if faults.known else []
+            self._state, self._imu = self._senses.sense(self.truth(), self._true_imu(), *given)
 
     def _true_imu(self) -> ImuSample:
         sensor = self._data.sensor

@@ -6,29 +6,34 @@ joint that no actuator drives, and the IMU. It must have the size of the robot t
 another robot with joints of these names is refused, and named if there is a profile of it.
 Everything else stays as the file says, except that the time step is the plant's. An actuator that
 is not a plain torque motor is refused, never replaced; so are angles that must be degrees, and
-ranges that keep the robot from folding its legs.
+ranges that keep the robot from folding its legs. ``starter_scene`` writes
+one to begin with: the robot, a box on its back, a ramp, and keyframes.
 """
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
 from go2_wbc.errors import ModelMismatch
 from go2_wbc.legs import JOINT_NAMES, LEGS
-from go2_wbc.plant.mujoco.layout import foot_geoms, is_on_joint
+from go2_wbc.plant.mujoco.forces import foot_geoms, is_on_joint
 from go2_wbc.plant.mujoco.model import (
+    DEFAULT_FRICTION,
     GYRO,
     JointDynamics,
     add_floor,
     add_imu,
     add_motors,
+    build_spec,
     set_joint_dynamics,
 )
-from go2_wbc.robot.description import RobotDescription, find_description
-from go2_wbc.robot.profile import profile_names
+from go2_wbc.robot.description import BASE_LINK, RobotDescription, find_description, profile_names
 
 _BASE_FALLBACK = "go2_wbc_base"
 MASS_RATIO = 1.6
@@ -234,3 +239,46 @@ def _has_ground(spec: mujoco.MjSpec) -> bool:
         (geom.contype or geom.conaffinity) and (geom.type in kinds or geom.parent.name == "world")
         for geom in spec.geoms
     )
+
+
+RAMP_PITCH = np.deg2rad(10.0)
+RAMP_START, RAMP_HALF_SIZE = 0.6, (1.0, 0.6, 0.02)
+"""m; from where on it rises ahead of the robot, and half its length, width and height."""
+RAMP_MIDDLE = (RAMP_START + np.cos(RAMP_PITCH), 0.0, np.sin(RAMP_PITCH))  #: m; of its upper side
+_BOX_MASS, _BOX_PLACE, _BOX_HALF_SIZE = 2.0, (0.0, 0.0, 0.10), (0.10, 0.06, 0.04)
+_NOTES = {
+    "<mujoco ": """A Go2 with a box on its back, before a ramp. Lengths in m, masses in kg, angles
+     in rad. MujocoPlant("FILE") begins lying, MujocoPlant("FILE", keyframe="ramp") in a stance.""",
+    '<geom name="ramp"': "The ramp: pos and quat (w x y z) of its middle, half its size.",
+    '<body name="box"': "The box on the back: pos in the base's frame, half its size, mass.",
+    "<keyframe>": """Where it may begin. qpos: place of the base, its quaternion w x y z,
+       then hip, thigh, calf of FL, FR, RL, RR.""",
+}
+"""What is said above each part."""
+
+
+def starter_scene(stances: Mapping[str, Float[np.ndarray, "19"]]) -> str:
+    """MJCF with a keyframe for each of the configurations (quaternion x y z w).
+
+    The meshes are those of the installed robot, by absolute paths.
+    """
+    spec = build_spec(find_description(), JointDynamics(), friction=DEFAULT_FRICTION)
+    box = spec.body(BASE_LINK).add_body(name="box", pos=list(_BOX_PLACE))
+    kind = mujoco.mjtGeom.mjGEOM_BOX
+    box.add_geom(name="box", type=kind, size=list(_BOX_HALF_SIZE), mass=_BOX_MASS)
+    normal = np.array([-np.sin(RAMP_PITCH), 0.0, np.cos(RAMP_PITCH)])
+    spec.worldbody.add_geom(
+        name="ramp",
+        type=kind,
+        pos=(RAMP_MIDDLE - RAMP_HALF_SIZE[2] * normal).tolist(),
+        quat=[np.cos(0.5 * RAMP_PITCH), 0.0, -np.sin(0.5 * RAMP_PITCH), 0.0],
+        size=list(RAMP_HALF_SIZE),
+        friction=[DEFAULT_FRICTION, 0.005, 0.0001],
+    )
+    for name, q in stances.items():
+        spec.add_key(name=name, qpos=[*q[:3], *q[[6, 3, 4, 5]], *q[7:]])
+    spec.compile()
+    text = spec.to_xml()
+    for place, note in _NOTES.items():
+        text = re.sub(f"^( *)(?={place})", rf"\1<!-- {note} -->\n\1", text, flags=re.MULTILINE)
+    return text

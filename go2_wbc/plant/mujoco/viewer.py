@@ -15,8 +15,7 @@ from go2_wbc.plant.mujoco.plant import MujocoPlant
 
 _log = logging.getLogger(__name__)
 
-FRAME_RATE = 50.0
-"""Frames per second of robot time that ``PlantViewer.show`` shows at most."""
+FRAME_RATE = 50.0  #: Frames per second of robot time that ``PlantViewer.show`` shows at most
 
 
 def display_problem() -> str | None:

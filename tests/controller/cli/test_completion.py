@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from controller.cli.completion import SHELLS
-from controller.cli.main import COMMANDS
+from controller.cli.main import COMMANDS, SHELLS
 from motions import motion_names
 from tests.controller.cli.conftest import Run
 

@@ -14,10 +14,9 @@ import pytest
 
 import viz
 from controller.cli import demo
-from controller.cli.common import ExitCode
+from controller.cli.common import ExitCode, ProgressLine, progress_bar
 from controller.cli.demo import render
 from controller.cli.main import high_five_demo
-from controller.cli.progress import ProgressLine, progress_bar
 from controller.demo import DemoReport, DemoTotals, Measurement, StepResult, run_demo
 from controller.demo.steps import TERRAINS
 from go2_wbc.config import Config
@@ -344,7 +343,7 @@ def test_of_what_a_search_says_the_first_answer_stays_on_a_terminal(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """It was cut to the terminal's width and gone after a tenth of a second."""
-    from motions.dynamics.search import _log
+    from motions.dynamics.shooting_problem import _log
 
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     with ProgressLine() as line:

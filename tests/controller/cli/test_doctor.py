@@ -11,8 +11,7 @@ import pytest
 from controller.cli import doctor
 from controller.cli.common import PROGRAM, ExitCode
 from controller.cli.doctor import Finding, ImportProbe, Status
-from go2_wbc.errors import DescriptionError
-from go2_wbc.extras import EXTRAS
+from go2_wbc.errors import EXTRAS, DescriptionError
 from tests.controller.cli.conftest import Run
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -16,7 +16,7 @@ from motions import FeasibilityChecker, Timeline
 from tests.controller.cli.conftest import Run
 from tests.live_preview import BROKEN, GOOD, TOO_HIGH, LivePreview
 from tests.viz.page_reader import read_data
-from viz.replay.html_page import PAGE_LIMIT
+from viz.replay.page_data import PAGE_LIMIT
 
 
 @pytest.fixture

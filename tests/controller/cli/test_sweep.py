@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from controller.cli.common import ExitCode
-from controller.cli.progress import ProgressLine
+from controller.cli.common import ExitCode, ProgressLine
 from controller.cli.sweep import tell
 from controller.sweeps import read_sweep
 from controller.sweeps.run import Progress

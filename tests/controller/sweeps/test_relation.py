@@ -7,7 +7,7 @@ from controller.sweeps.relation import relations
 from controller.sweeps.summary import mean_interval, rate_interval
 from controller.sweeps.sweep_file import columns_of
 from go2_wbc.errors import CommandError, ConfigError
-from viz.render.study_plots import relation_figure
+from viz.render.plots import relation_figure
 
 RNG = np.random.default_rng(4)
 FRICTION = RNG.uniform(0.4, 1.0, 96)

@@ -17,7 +17,7 @@ from go2_wbc.planning.trunk import LEVEL, BodyPose
 from go2_wbc.plant.terrain import Stairs
 from go2_wbc.reference import Target
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.payload import NO_PAYLOAD, Payload
+from go2_wbc.robot.rigid_body import NO_PAYLOAD, Payload
 from go2_wbc.robot.state import Snapshot
 from tests.engine_helpers import random_state, standing_q, state_of
 from tests.go2_wbc.planning.seen import exact_map

@@ -9,9 +9,8 @@ import pytest
 
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, LEGS
-from go2_wbc.robot.description import find_description
+from go2_wbc.robot.description import find_description, find_profile
 from go2_wbc.robot.model import FINGERPRINT, RobotModel, fingerprint
-from go2_wbc.robot.profile import find_profile
 from tests.engine_helpers import random_state
 
 HIP_LIMIT = find_profile().hip_limit

@@ -10,6 +10,7 @@ import pytest
 
 from go2_wbc.errors import ConfigError
 from go2_wbc.records import packed
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import (
     LEAST_SHARE,
@@ -20,7 +21,6 @@ from go2_wbc.robot.motor import (
     drive,
     note_peaks,
 )
-from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.state import JointCommand, RobotState
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WholeBodyController

@@ -39,6 +39,18 @@ def test_a_broken_motor_is_named_once(share: float, what: str, late: int) -> Non
     assert fault.is_survived is (share > 0.0)
 
 
+def test_a_motor_that_dies_while_less_and_less_is_asked_is_dead() -> None:
+    watch = MotorWatch(RobotModel().motor)
+    for t in DT * np.arange(400):
+        tau = np.full(12, 8.0 * np.exp(-max(t - 0.4, 0.0) / 0.2))
+        given = tau * (np.arange(12) != 4) if t > 0.4 else tau
+        state = RobotState(t, np.zeros(19), np.zeros(18), given, np.zeros(4), np.ones(4, bool))
+        watch.update(JointCommand.torque(tau), state, DT)
+    (fault,) = watch.faults
+    assert fault.part == "motor of FR_thigh_joint"
+    assert not fault.is_survived
+
+
 def test_a_motor_of_which_little_is_asked_is_not_judged() -> None:
     assert watched(0.0, amplitude=0.03).faults == ()
 

@@ -9,8 +9,8 @@ import pytest
 from go2_wbc.errors import ConfigError
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import JointFriction
-from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.payload_estimation import PayloadConfig, PayloadEstimator, follow_wrench
+from go2_wbc.robot.rigid_body import NO_PAYLOAD, Payload
 from go2_wbc.robot.state import RobotState
 from tests.compiled import assert_plain_is_compiled
 from tests.engine_helpers import random_state, standing_q, state_of

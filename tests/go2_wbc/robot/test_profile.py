@@ -12,9 +12,8 @@ from go2_wbc.config import Config, load_config
 from go2_wbc.errors import ConfigError, ModelMismatch
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.model import JointDynamics, build_spec
-from go2_wbc.robot.description import find_description
+from go2_wbc.robot.description import RobotProfile, find_description, find_profile, profile_names
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import RobotProfile, find_profile, profile_names
 from motions import FeasibilityChecker
 from tests.engine_helpers import random_state
 

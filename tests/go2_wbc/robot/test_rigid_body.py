@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.payload import NO_PAYLOAD, Payload
-from go2_wbc.robot.rigid_body import fill_snapshot
+from go2_wbc.robot.rigid_body import NO_PAYLOAD, Payload, fill_snapshot
 from go2_wbc.robot.state import RobotState, Snapshot
 from tests.compiled import assert_plain_is_compiled
 from tests.engine_helpers import random_state, state_of

@@ -8,9 +8,8 @@ import pytest
 
 from go2_wbc.errors import ConfigError
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.robot.description import BASE_LINK
+from go2_wbc.robot.description import BASE_LINK, find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.safety import FallDetector, SafetyConfig, heights, is_plausible
 from go2_wbc.robot.state import Snapshot
 from tests.compiled import assert_plain_is_compiled

@@ -9,7 +9,14 @@ import pytest
 from go2_wbc.algebra.linear import triple
 from go2_wbc.compilation import plain
 from go2_wbc.legs import FOOT_NAMES
-from go2_wbc.robot.imu_watch import CALM, SHAKEN, WatchedImu, judge_jump
+from go2_wbc.robot.imu_watch import (
+    CALM,
+    LONG_CALM,
+    SHAKEN,
+    WatchedImu,
+    judge_accelerometer,
+    judge_jump,
+)
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.sensor_watch import (
@@ -34,7 +41,7 @@ MODEL = RobotModel()
 STANDING = np.tile([0.05, 0.8, -1.6], 4)
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
 DT = 0.002
-ZERO = (0.0, 0.0, 0.0)
+ZERO, UP = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
 def standing_torques() -> np.ndarray:
@@ -273,6 +280,35 @@ def test_a_blow_is_no_error_of_the_accelerometer() -> None:
         *(reading(k, accelerometer=blow if 600 <= k < 610 else up) for k in range(1000))
     )
     assert faults == ()
+
+
+@pytest.mark.parametrize(("lack", "is_off"), [(0.0, 0.0), (-1.0, 1.0)])
+def test_what_legs_push_by_is_felt_and_an_error_is_what_they_lack(
+    lack: float, is_off: float
+) -> None:
+    m = WatchedImu(stood=2.0 * LONG_CALM)
+    for _ in range(300):
+        m.push[:], m.lack[0] = (0.8, 0.0, 9.81), lack
+        plain(judge_accelerometer)(m, (1.0, 0.0, 9.81), ZERO, ZERO, UP, 9.81, True, DT)
+    assert m.force_is_off == is_off
+
+
+@pytest.mark.parametrize(("lasts", "parts"), [(0.2, []), (0.6, ["accelerometer"])])
+def test_what_begins_as_a_foot_springs_back_has_to_last(lasts: float, parts: list[str]) -> None:
+    readings = [reading(k) for k in range(1200)]
+    for k in range(600, 660):
+        readings[k] = reading(k, foot_forces=np.array([200.0 + k % 3, 40.0, 40.0, 40.0]))
+    for k in range(700, 700 + round(lasts / DT)):
+        readings[k] = reading(k, accelerometer=np.array([0.0, 0.0, 11.0 + 0.01 * (k % 2)]))
+    assert [fault.part for fault in watched(*readings)[1]] == parts
+
+
+def test_a_lifted_foot_that_presses_tells_nothing_of_the_imu() -> None:
+    watch = SensorWatch(MODEL)
+    for k in range(100):
+        watch.checked(reading(k), LEVEL)
+    watch.checked(reading(100, foot_forces=np.array([0.0, 40.0, 40.0, 40.0])), LEVEL)
+    assert (watch._state.stood > 0.0).tolist() == [False, True, True, True]
 
 
 @pytest.mark.parametrize("axis", range(3))

@@ -7,8 +7,8 @@ import pytest
 
 from go2_wbc.legs import Leg
 from go2_wbc.reference import Anchor, LegTask, Reference, Target
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import find_profile
 from go2_wbc.tracking.landing import (
     EARLIEST,
     NEAR,

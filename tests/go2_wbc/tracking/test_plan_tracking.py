@@ -21,7 +21,7 @@ from go2_wbc.planning.trunk import (
 from go2_wbc.records import packed
 from go2_wbc.reference import Anchor, BodyTarget, LegTask, Reference, Target, TrackedPoint
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.payload import NO_PAYLOAD, Payload
+from go2_wbc.robot.rigid_body import NO_PAYLOAD, Payload
 from go2_wbc.robot.rotations import quaternion_from_rpy, rotation_from_rpy
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.tracking.landing import Landing

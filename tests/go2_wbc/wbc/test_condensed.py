@@ -14,7 +14,7 @@ import pytest
 from go2_wbc.algebra.active_set import SOLVED, VIOLATION
 from go2_wbc.reference import Reference, Target
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.payload import Payload
+from go2_wbc.robot.rigid_body import Payload
 from go2_wbc.robot.rotations import rotation_from_rpy
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.condensed import Decision, Workspace, is_within, solve_tick

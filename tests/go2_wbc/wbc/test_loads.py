@@ -11,7 +11,7 @@ from go2_wbc.reference import Reference, Target
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.controller import WholeBodyController
-from go2_wbc.wbc.loads import LEAST_LOAD, MOST_LOAD, plan_loads, share_load
+from go2_wbc.wbc.trajectory_loads import LEAST_LOAD, MOST_LOAD, plan_loads, share_load
 from tests.engine_helpers import JO, ST, holding_reference, standing_q, state_of
 
 MODEL = RobotModel()

@@ -11,7 +11,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
-from go2_wbc.wbc.relaxation import LIMITS, is_grave, solve_relaxed
+from go2_wbc.wbc.solvers import LIMITS, is_grave, solve_relaxed
 from tests.engine_helpers import (
     MODES,
     motion_error,

@@ -9,10 +9,9 @@ import pytest
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import LegTask, Reference, Target, TrackedPoint
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.payload import Payload
+from go2_wbc.robot.rigid_body import Payload
 from go2_wbc.robot.rotations import log_rotation
 from go2_wbc.robot.state import Snapshot
-from go2_wbc.wbc.loads import plan_loads
 from go2_wbc.wbc.tasks import (
     BodyOrientation,
     BodyPosition,
@@ -23,6 +22,7 @@ from go2_wbc.wbc.tasks import (
     Task,
     orientation_error,
 )
+from go2_wbc.wbc.trajectory_loads import plan_loads
 from tests.engine_helpers import (
     JO,
     MODES,

@@ -8,13 +8,14 @@ from go2_wbc.records import packed
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.constraints import friction_pyramid
-from go2_wbc.wbc.loads import LEAST_PRESSURE, share_load
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 from go2_wbc.wbc.trajectory_loads import (
+    LEAST_PRESSURE,
     LoadNumbers,
     accelerate,
     lag,
     least_friction,
+    share_load,
     share_loads,
     slide,
 )

@@ -4,7 +4,8 @@ import pytest
 
 from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
-from motions.dynamics import DynamicTrajectory, PhaseProblem, phase_builders, solve
+from motions.dynamics import DynamicTrajectory, PhaseProblem, solve
+from motions.dynamics import phases as phase_builders
 from tests.solver import HAS_SOLVER, IS_REQUIRED
 
 PROBLEMS = {

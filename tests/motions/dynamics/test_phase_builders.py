@@ -10,9 +10,9 @@ from go2_wbc.errors import TimelineError
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
-from motions.dynamics import Phase, PhaseProblem, phase_builders
-from motions.dynamics.phase_builders import FOOTPRINT
-from motions.dynamics.phases import ALL_FEET, KNOT_PERIOD
+from motions.dynamics import Phase, PhaseProblem
+from motions.dynamics import phases as phase_builders
+from motions.dynamics.phases import ALL_FEET, FOOTPRINT, KNOT_PERIOD
 
 
 def test_the_footprint_is_that_of_the_standing_robot(model: RobotModel) -> None:

@@ -11,7 +11,7 @@ from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline, deg
 from motions.dynamics import DynamicTrajectory, Tolerance, audit
-from motions.dynamics.projection import PlanTarget, _knots, _lag, nearest
+from motions.dynamics.solver import PlanTarget, _knots_of_written, _lag_of, nearest
 from motions.plan.trajectory import trajectory_of
 
 WIDE = Tolerance(0.1, math.radians(15.0))
@@ -73,12 +73,12 @@ def test_a_lag_is_told_if_it_explains_what_is_off_and_too_far_is_refused(
 ) -> None:
     line = Timeline().hold(0.3).body(y=0.03, over=0.4).home(over=0.4).hold(0.3)
     asked = written(line, model)
-    knots, plan = _knots(asked, model), nearest(asked, model)
+    knots, plan = _knots_of_written(asked, model), nearest(asked, model)
     late = np.column_stack([np.interp(knots.times - 0.04, knots.times, c) for c in knots.q.T])
-    assert _lag(knots, replace(plan, q=late)) == pytest.approx(0.04)
+    assert _lag_of(knots, replace(plan, q=late)) == pytest.approx(0.04)
     rng = np.random.default_rng(3)
     swaying = knots.q + 0.01 * rng.standard_normal(knots.q.shape)
-    assert _lag(knots, replace(plan, q=swaying)) == 0.0
+    assert _lag_of(knots, replace(plan, q=swaying)) == 0.0
     with pytest.raises(PlanNotFound, match="within 1 mm") as caught:
         nearest(written(SWAY, model), model, tolerance=Tolerance(0.001, 0.1))
     assert any(reason.startswith("trunk at") for reason in caught.value.reasons)

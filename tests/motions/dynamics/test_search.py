@@ -13,7 +13,8 @@ import pytest
 
 from go2_wbc.errors import PlanNotFound
 from go2_wbc.robot.model import RobotModel
-from motions.dynamics import DynamicTrajectory, PhaseProblem, Tolerance, phase_builders, solve
+from motions.dynamics import DynamicTrajectory, PhaseProblem, Tolerance, solve
+from motions.dynamics import phases as phase_builders
 from motions.dynamics.knots import Knots, Solution, knots_of, pose_of
 from motions.dynamics.phases import Phase
 from motions.dynamics.plan_audit import PlanLimits, Weights
@@ -73,17 +74,17 @@ def test_solving_leaves_nothing_behind_whether_or_not_there_is_a_plan(
     tolerance: Tolerance,
 ) -> None:
     """The solver held its callback, and that the search with its solvers: 114 MB a question."""
-    from motions.dynamics import search, shooting_problem
+    from motions.dynamics import shooting_problem
 
     made: list[weakref.ref[object]] = []
-    for module, name in ((shooting_problem, "ShootingProblem"), (search, "Search")):
+    for name in ("ShootingProblem", "Search"):
 
-        class Noted(getattr(module, name)):
+        class Noted(getattr(shooting_problem, name)):
             def __init__(self, *args: object, **kwargs: object) -> None:
                 super().__init__(*args, **kwargs)
                 made.append(weakref.ref(self))
 
-        monkeypatch.setattr(module, name, Noted)
+        monkeypatch.setattr(shooting_problem, name, Noted)
     try:
         solve(replace(LIFT, tolerance=tolerance), model)
     except PlanNotFound:
@@ -93,8 +94,7 @@ def test_solving_leaves_nothing_behind_whether_or_not_there_is_a_plan(
 
 
 def test_a_solution_that_does_not_turn_is_left_for_the_next_start(model: RobotModel) -> None:
-    from motions.dynamics.search import Search
-    from motions.dynamics.shooting_problem import ShootingProblem
+    from motions.dynamics.shooting_problem import Search, ShootingProblem
 
     knots = knots_of(LIFT, model, PlanLimits())
     soft, full = (
@@ -142,7 +142,7 @@ def test_the_first_guess_turns_in_the_air_as_far_as_was_asked(
 def test_what_binds_is_said_within_a_second_and_what_is_tried(
     model: RobotModel, caplog: pytest.LogCaptureFixture
 ) -> None:
-    from motions.dynamics.search import FIRST_ANSWER
+    from motions.dynamics.shooting_problem import FIRST_ANSWER
 
     impossible = PhaseProblem(phase_builders.jump(height=0.4))
     began = time.thread_time()

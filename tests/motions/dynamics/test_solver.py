@@ -18,9 +18,9 @@ from motions.dynamics import (
     Solved,
     Tolerance,
     audit,
-    phase_builders,
     solve,
 )
+from motions.dynamics import phases as phase_builders
 from motions.dynamics.plan_audit import PlanLimits
 from motions.dynamics.solver import continued
 from motions.postures import standing_feet

@@ -3,7 +3,7 @@
 import numpy as np
 
 from go2_wbc.robot.model import RobotModel
-from motions.feasibility.case import Case, Forces
+from motions.feasibility.forces import Case, Forces
 from motions.plan.trajectory import Trajectory
 
 

@@ -9,8 +9,8 @@ from go2_wbc.errors import CommandError, ConfigError, MotionInfeasible
 from go2_wbc.geometry import support_margin
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import Posture
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import find_profile
 from go2_wbc.world import World
 from motions import (
     CheckedMotion,

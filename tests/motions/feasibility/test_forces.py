@@ -16,7 +16,7 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import Snapshot
-from go2_wbc.wbc import loads
+from go2_wbc.wbc import trajectory_loads as loads
 from go2_wbc.wbc.constraints import friction_pyramid
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 from go2_wbc.wbc.trajectory_loads import lag, least_friction, slide
@@ -184,7 +184,7 @@ def expected_loads(
     shares: Float[np.ndarray, " k"],
     model: RobotModel,
 ) -> Float[np.ndarray, " k"]:
-    """The expected loads of ``legs``, over their mean: see ``wbc.loads``."""
+    """The expected loads of ``legs``, over their mean: see ``wbc.trajectory_loads``."""
     R = snapshot.R_world_base
     force, moment = R @ wrench[:3], R @ wrench[3:]
     pressure = max(force[2], loads.LEAST_PRESSURE * model.mass * model.gravity)

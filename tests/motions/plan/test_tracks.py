@@ -3,8 +3,8 @@
 import numpy as np
 
 from go2_wbc.legs import Leg
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import find_profile
 from motions import Timeline
 from motions.language.footing import Footing
 from motions.plan.tracks import Instants, LegTracks

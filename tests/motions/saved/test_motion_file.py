@@ -18,7 +18,7 @@ from go2_wbc.errors import ConfigError, MotionFileError, TimelineError
 from motions import Timeline, check, find_motion, load_motion, motion_names, save_motion
 from motions.language.keys import Key
 from motions.saved import values
-from motions.saved.motion_file import KINDS
+from motions.saved.files import KINDS
 from tests.motions.saved.random_timelines import Written, timeline_of, written
 
 TIMELINE = (

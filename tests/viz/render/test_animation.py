@@ -9,7 +9,7 @@ from PIL import Image
 import viz
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
-from viz.render.animation import SIZE_LIMIT, frame_times
+from viz.render.pictures import SIZE_LIMIT, frame_times
 
 _SIZE = (240, 150)
 
@@ -90,7 +90,7 @@ def test_quality_gives_way_to_the_size_limit(
     recording: Recording, tmp_path: Path, animation: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     limit = animation.stat().st_size * 2 // 3
-    monkeypatch.setattr("viz.render.animation.SIZE_LIMIT", limit)
+    monkeypatch.setattr("viz.render.pictures.SIZE_LIMIT", limit)
     smaller = viz.export_animation(recording, tmp_path / "a.webp", speed=2.0, fps=10, size=_SIZE)
     assert smaller.stat().st_size <= limit
 
@@ -98,7 +98,7 @@ def test_quality_gives_way_to_the_size_limit(
 def test_a_file_that_stays_too_large_is_refused(
     recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("viz.render.animation.SIZE_LIMIT", 500)
+    monkeypatch.setattr("viz.render.pictures.SIZE_LIMIT", 500)
     with pytest.raises(ConfigError, match="limit 500"):
         viz.export_animation(recording, tmp_path / "a.webp", speed=8.0, fps=4, size=(64, 40))
     assert list(tmp_path.iterdir()) == []

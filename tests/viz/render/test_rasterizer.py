@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from viz.render.camera import Camera
-from viz.render.rasterizer import rasterize
+from viz.render.mesh import rasterize
 
 
 @pytest.mark.parametrize("seed", range(5))

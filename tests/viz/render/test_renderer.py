@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 
 from go2_wbc.legs import LEGS
-from go2_wbc.robot.profile import find_profile
+from go2_wbc.robot.description import find_profile
 from tests.viz.synthetic import step_ahead
 from viz.render.camera import Camera
-from viz.render.floor import paint_floor
-from viz.render.ground import Relief, grid_of
-from viz.render.mesh import Surface
-from viz.render.rasterizer import rasterize
-from viz.render.renderer import render, towards_lights
+from viz.render.frame_renderer import render, towards_lights
+from viz.render.ground import Relief, grid_of, paint_floor
+from viz.render.mesh import Surface, rasterize
 from viz.render.robot_meshes import PosedRobot, load_robot_visuals
 
 FOOT_RADIUS = find_profile().foot_radius

@@ -13,8 +13,7 @@ from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.mujoco.model import JointDynamics, build_spec
 from go2_wbc.recording import Recording
-from go2_wbc.robot.description import find_description
-from go2_wbc.robot.profile import find_profile, profile_names
+from go2_wbc.robot.description import find_description, find_profile, profile_names
 from viz.render.mesh import arrow
 from viz.render.robot_meshes import PosedRobot, load_robot_visuals, visuals_of
 

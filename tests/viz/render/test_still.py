@@ -13,8 +13,8 @@ from go2_wbc.legs import Leg
 from go2_wbc.recording import Recording
 from viz.render.camera import camera_path, heading_path, nearest_rows
 from viz.render.frame_renderer import FrameRenderer, ShotStyle
+from viz.render.pictures import telling_times
 from viz.render.robot_meshes import PosedRobot, load_robot_visuals
-from viz.render.still import telling_times
 
 
 def test_it_is_a_picture_with_round_transparent_corners(

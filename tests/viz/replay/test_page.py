@@ -23,8 +23,7 @@ from tests.viz.synthetic import step_ahead
 from tests.viz.verdicts import made_up_verdict
 from viz.content import ReplayContent
 from viz.render.robot_meshes import load_robot_visuals
-from viz.replay.html_page import PAGE_LIMIT
-from viz.replay.page_data import reduced, replay_frames
+from viz.replay.page_data import PAGE_LIMIT, reduced, replay_frames
 
 _ROUNDING = 1e-3
 """Steps of the 16-bit numbers [m, rad, N]."""
@@ -147,7 +146,7 @@ def test_the_same_recording_gives_the_same_page_and_an_hour_still_fits(
 def test_a_page_over_the_limit_is_refused(
     recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("viz.replay.html_page.PAGE_LIMIT", 1000)
+    monkeypatch.setattr("viz.replay.page_data.PAGE_LIMIT", 1000)
     with pytest.raises(ConfigError, match="limit 1000"):
         viz.export_html(recording, tmp_path / "big.html", title="t")
     assert list(tmp_path.iterdir()) == []

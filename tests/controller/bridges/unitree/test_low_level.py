@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controller.behaviours.joints import DAMPING
+from controller.behaviours import DAMPING
 from controller.bridges.unitree import messages
 from controller.bridges.unitree.low_level import (
     RELEASE,
@@ -20,8 +20,8 @@ from controller.bridges.unitree.low_level import (
 from controller.bridges.unitree.messages import encode_message
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.legs import Leg
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.profile import find_profile
 from go2_wbc.robot.rotations import quaternion_from_rpy
 from go2_wbc.robot.state import JointCommand, RobotState
 from tests.controller.plants import is_limp, lying_state

@@ -9,7 +9,7 @@ import pytest
 from go2_wbc.errors import CommandError
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.robot.profile import find_profile
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.state import JointCommand
 from tests.go2_wbc.plant.contract import DAMPED
 from tests.go2_wbc.plant.helpers import GRAVITY, STAND, fly, momentum, stand_up

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from go2_wbc.legs import JOINT_NAMES
-from go2_wbc.plant.mujoco.layout import FOREIGN, LIMB_BIN, ROBOT_BINS, bin_forces, read_joints
+from go2_wbc.plant.mujoco.forces import FOREIGN, LIMB_BIN, ROBOT_BINS, bin_forces, read_joints
 from go2_wbc.plant.mujoco.plant import MujocoPlant
 from go2_wbc.plant.terrain import Boxes
 from tests.compiled import assert_plain_is_compiled

@@ -36,8 +36,7 @@ from go2_wbc.plant.terrain import (
     Terrain,
     Waves,
 )
-from go2_wbc.robot.description import find_description
-from go2_wbc.robot.profile import find_profile
+from go2_wbc.robot.description import find_description, find_profile
 from go2_wbc.robot.state import JointCommand
 from tests.go2_wbc.plant.helpers import STAND
 

@@ -7,9 +7,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from go2_wbc.kept_code import CACHE_VARIABLE, kernel_folder
+from go2_wbc.machine_code import CACHE_VARIABLE, kernel_folder
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.plant.mujoco import settling
+from go2_wbc.plant.mujoco import setup as settling
 from go2_wbc.robot.state import JointCommand
 
 STEPS = 200
