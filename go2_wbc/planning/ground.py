@@ -9,10 +9,9 @@ more slowly, in quicker strides, until it has come ``RoughConfig.way`` without a
 Its friction is told by feet that slide. Of ground on which the robot has not walked yet nothing is
 known. The estimate begins low there (``LocomotionConfig.ground_friction``), and rises as it steps
 and nothing slides: a walk that began with 0.6 slid at once on a friction of 0.2, and where commands
-act 10 ms late as well it fell in its first second. With 0.35 it fell on its own sensors; with 0.2
-it follows a curve as it begins by 0.03 m/s less exactly than with 0.6, and withstands the same
-pushes. A robot that stands on the feet of one side, or of one end, pushes along the ground or tips
-over: until a foot has slid it counts on ``MOST_FRICTION``.
+act 10 ms late as well it fell in its first second. With 0.2 it follows a curve as it begins by 0.03
+m/s less exactly, and withstands the same pushes. A robot that stands on the feet of one side, or of
+one end, pushes along the ground or tips over: until a foot has slid it counts on ``MOST_FRICTION``.
 
 A foot that carries load and slides has less friction than it was counted on. While one does, the
 estimate falls towards what that foot shows, and otherwise it recovers, slowly:
@@ -24,9 +23,7 @@ The forces along the ground and into it, ``f_t`` and ``f_n``, are those that the
 the foot's leg make. Part of ``f_t`` has gone into the leg that slides, not into the ground: more
 of it the faster it is. A foot that creeps at the edge of its friction, as one that a push has
 overloaded, shows nearly the ratio that it bore, and the estimate hardly falls. To fall towards the
-least at every slide took the force away with which the robot would have caught itself: of 40 trots
-with their calves at their stops and pushes of 20 N s 3 fell. As it is now 4 of 150 fall, and 6 of
-150 without an estimate (own simulation, seeds 0 to 149; of the 20 that are judged 2, and none).
+least at every slide took the force away with which the robot would have caught itself.
 
 A foot slides if its contact point has been faster than a speed for some time. Just after touchdown
 it may: there the foot still comes to rest. One that chatters while it slides, which on the robot's
@@ -60,7 +57,7 @@ LEVEL_SLOPE = 0.05
 SLOPE_SHARE = 0.3
 """Share of the slope that was found at a landing that is taken in."""
 ROUGH_SLOPE_SHARE = 0.5
-"""The same on rough ground: 11 of 12 robots came up and down stairs of 14 cm, 8 with 0.3."""
+"""The same on rough ground."""
 FOLLOW = 0.7
 """Share of the slope by which the trunk is tilted."""
 SMOOTH, MOST_RAISE = 0.015, 0.05
@@ -73,13 +70,13 @@ ROUGH_PACE = 0.85
 brushes the ground once in a swing goes on."""
 STEEP, STEEP_FORGETS = 0.15, 7.0
 """Slope from which on that is forgotten sooner, and how many times as soon where it is twice as
-steep: on stairs every other foot tells it anew, but on a ramp of 22 deg it is only its beginning,
-and 3 of 10 robots fell behind it that still walked as on stairs."""
+steep: on stairs every other foot tells it anew, but on a ramp it is only its beginning."""
 FIRST_WAY = 0.5
-"""For how far [m] the first step is taken for a high one, and after one up the next is expected."""
+"""For how far [m] the first step is taken for a high one, after one up the next is expected, and
+behind a ramp a slope is taken for its."""
 LIFT_RATE, LEAN_RATE, LEAN_SPEED = 0.3, 1.0, 0.1
 """Greatest rate [m/s] at which the trunk is lifted for it, and [1/s] at which its leading end is,
-and speed [m/s] from which on the latter is in full. These are from a search in simulation."""
+and speed [m/s] from which on the latter is in full."""
 HASTE_FRICTION = 0.45
 """Friction from which on the ground bears the greatest acceleration; on less it falls with the
 square: what slid once shows less than there is, and goes on at once on ground that has it."""
@@ -89,11 +86,10 @@ from which on it does by the last share of it."""
 LATE_SPEED, LATE_ASIDE = 1.25, 0.6
 """Greatest speeds [m/s] ahead and aside then. Faster ahead, feet stand for so short a time that one
 that lifts off, or comes down, by 9 ms too late or too early makes the hops between them grow until
-the robot falls. Faster aside, the foot that comes down strikes the one beside it that has not left
-yet: in 5 minutes of reversals of 1 m/s, 0 to 18 ms late, in 82 ticks."""
+the robot falls. Faster aside, the foot that comes down strikes the one beside it."""
 QUICK, FAST, FAST_HASTE = 2.0, 2.6, 0.2
 """The same by the speed [m/s]: motors that turn fast have less torque, and the trunk sinks where it
-is asked for more. Speeding up as at rest none of 18 robots came to 3.5 m/s, with this all 10."""
+is asked for more."""
 ROUGH_HASTE = 1.0 / 7.0
 """Share of the accelerations that is left there."""
 CALMING = 0.8
@@ -101,9 +97,8 @@ CALMING = 0.8
 STUMBLE = 0.06
 """Roughness [m] that a foot tells which is stopped in the middle of its swing."""
 DELAY = 0.4
-"""Share of a swing, on the roughest ground, in which the foot only rises. At a step of 10 cm, feet
-that stood close to it rubbed along its face and stood on its edge: 4 of 40 runs fell, none with
-this. It and the six before are from a search on this robot in simulation."""
+"""Share of a swing, on the roughest ground, in which the foot only rises: feet close to a step
+rubbed along its face. It and the six before are from a search in simulation."""
 SLIP_SPEED, SLIP_PATIENCE = 0.1, 0.004
 """Speed [m/s] of the contact point, along the ground, above which a foot slides, and the time [s]
 for which it must. These numbers are from a search on this robot in simulation."""
@@ -128,15 +123,11 @@ _TINY = 1e-9
 class RoughConfig:
     """How the robot walks where its feet have found the ground rough.
 
-    Up and down 6 stairs of 14 cm none of 6 robots came as on smooth ground, and 24 of 28 with
-    these; with longer stances of 0.2 s 4 of 8, with swings by 0.05 s longer 2 of 8, with both
-    0 of 6 (own simulation, friction 0.6 to 0.9, seeds 5100 to 5209).
-
     Attributes:
         speed: greatest speed [m/s].
         high: distance [m] from the plane at which feet meet high steps.
-        high_speed: greatest speed [m/s] among these: up and down those stairs came 10 of 10, and at
-            0.5 m/s 6. Of the first step it is not known yet, so it is taken for one.
+        high_speed: greatest speed [m/s] among these; the first step, of which that is not known
+            yet, is taken for one.
         way: for how far [m] either is remembered.
         raised: least height [m] by which a swing is higher.
         first_raised: the same as long as the ground has no slope: a foot that meets the first step
@@ -146,18 +137,14 @@ class RoughConfig:
         first_lift: height [m] by which the trunk is carried higher while a first step is expected.
         first_lean: slope by which its leading end is raised then. With the trunk as on smooth
             ground, its nose met the face of the second of those stairs before it had risen, and the
-            robot was thrown back: past the first two came 11 of 20, with the lift 18, with the lean
-            17, with both 20 (seeds 6000 to 6019). Carried on to where the ground falls away, they
-            kept the feet from reaching it: up and down came 16 with both, 19 as it is, 14 without.
+            robot was thrown back. Carried on to where the ground falls away, lift and lean would
+            keep the feet from reaching it.
         leash: greatest distance [m] of the height that is asked of the CoM from that it has. A foot
             that meets a step makes the wanted height jump: 9 cm at once threw the robot into the
             air, from where it fell.
         ease: by 1 plus this the weight of the trunk's attitude is divided. On friction that is
             believed to be low, the moment of a swing takes twice the robot's weight on the feet;
             with its weight ten times that of the place the attitude got it, and the robot took off.
-            Up and down those stairs came 13 of 20 without both, 17 with this, 19 with both; over
-            blocks of 14 cm 15, 20 and 19 (seeds 8800 to 8819, which tuned it). On seeds 10000 on
-            it was 7 of 12 without and 9 with both, and 10 and 9 of 10.
     """
 
     speed: float = 0.5
@@ -187,6 +174,7 @@ class Ground(Record):
         high_way: for how far [m] steps are taken for high yet.
         steeper: share of the slope by which the trunk follows it more.
         rise_way: for how far [m] steps up are expected yet.
+        ramp_way: for how far [m] a slope is taken for that of a ramp yet, not of stairs.
         lift: height [m] by which the trunk is carried higher for these.
         lean: slope that the trunk follows besides, to raise its leading end.
     """
@@ -200,6 +188,7 @@ class Ground(Record):
     high_way: float
     steeper: float
     rise_way: float
+    ramp_way: float
     lift: float
     lean: Float[np.ndarray, "2"]
 
@@ -224,6 +213,20 @@ def ground_at(g: Ground, x: float, y: float) -> float:
 def is_rough(g: Ground) -> bool:
     """Whether the feet have found it rough, lately."""
     return g.rough_way > 0.0
+
+
+@subroutine
+def landing_height(g: Ground, z: float) -> float:
+    """Height [m] at which a foot shall land whose place on the plane is as high as ``z``.
+
+    On rough ground it is led no higher than the highest of those that were met: at the top of
+    stairs the plane goes on to rise, feet that were led there swung on 10 cm above the landing, and
+    legs without ground below them pushed, or caught the trunk after a fall. A step that is higher
+    meets the foot on its way down.
+    """
+    if not is_rough(g):
+        return z
+    return min(z, max(g.p_met[0, 2], g.p_met[1, 2], g.p_met[2, 2], g.p_met[3, 2]))
 
 
 @subroutine
@@ -298,12 +301,11 @@ def level_friction(g: Ground, friction: float, least: float) -> float:
     A foot on a slope of 15 deg and a coefficient of 0.65 slides when it is pushed ahead with 0.6 of
     what it carries, although that is less: tan(atan(0.65) - 15 deg) is 0.33. Never below ``least``.
     What feet find of a slope on level ground takes nothing. Rough ground that rises is taken for
-    stairs, whose steps are level: with less friction there one run of twelve up stairs fell, none
-    without.
+    stairs, whose steps are level; behind the crest of a ramp, which is rough, hind feet on it slid.
     """
     steep = np.hypot(g.slope[0], g.slope[1])
     steep *= min(max(steep / LEVEL_SLOPE - 1.0, 0.0), 1.0)
-    if g.roughness > SMOOTH:
+    if g.roughness > SMOOTH and g.ramp_way <= 0.0:
         return friction
     return max((friction - steep) / (1.0 + friction * steep), least)
 
@@ -331,6 +333,8 @@ def carry_ground(g: Ground, c: RoughConfig, now: Snapshot, dt: float) -> None:
     way = c.way if g.roughness > c.high else FIRST_WAY if is_met and not is_rough(g) else 0.0
     steep = min(max(np.hypot(g.slope[0], g.slope[1]) / STEEP - 1.0, 0.0), 1.0)
     come = speed * dt * (1.0 + (STEEP_FORGETS - 1.0) * steep)
+    is_ramp = steep > 0.0 and not is_rough(g)
+    g.ramp_way = FIRST_WAY if is_ramp else max(g.ramp_way - speed * dt, 0.0)
     g.high_way = max(g.high_way - come, way)
     g.rough_way = max(g.rough_way - come, c.way if is_met else 0.0)
     x, y = now.p_world_com[0], now.p_world_com[1]

@@ -36,6 +36,7 @@ from go2_wbc.planning.ground import (
     ground_below,
     haste,
     is_rough,
+    landing_height,
     late_share,
     learn_ground,
     level_friction,
@@ -219,7 +220,8 @@ def fill_feet(
                 spans = elapsed[leg], remaining[leg]
                 swing_by_sight(leg, now, s, c, m, spans, goal, dt, p, v, a)
             else:
-                swing_foot(foot.swing, s.clock, config.swing, progress, goal, p, v, a)
+                land = landing_height(s.ground, goal[2])
+                swing_foot(foot.swing, s.clock, config.swing, progress, goal, land, p, v, a)
         target.normal_force_min[leg] = config.normal_force_min * share
         target.normal_force_max[leg] = config.normal_force_max * share
 

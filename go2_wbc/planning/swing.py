@@ -3,7 +3,9 @@
 With the share ``u`` of a span of ``T`` seconds and the ease ``s(u) = 3 u^2 - 2 u^3``, a coordinate
 goes from ``a`` to ``b`` as ``p = a + s (b - a)``; so ``v = s' (b - a) / T`` and
 ``a = s'' (b - a) / T^2``. Horizontally the span is the swing, or what is left of it after a delay,
-vertically each half of it.
+vertically each half of it; on rough ground its two parts are as the square roots of the ways up and
+down, so that the foot speeds up no more on one than on the other: halves made feet that rose to the
+next step push the robot down with its weight, and throw it when they slowed down.
 
 How high a foot is raised, and how late it goes ahead, is settled when it leaves the ground. What is
 learnt of the ground meanwhile is for the next swing: a curve that was changed on the way jumped by
@@ -33,7 +35,7 @@ import numpy as np
 from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
 from go2_wbc.planning.gait_clock import Clock
-from go2_wbc.planning.ground import Ground, RoughConfig, apex_raise, delay
+from go2_wbc.planning.ground import Ground, RoughConfig, apex_raise, delay, is_rough
 from go2_wbc.records import Array3, Record
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
@@ -122,12 +124,14 @@ class Swing(Record):
         raised: height [m] by which its apex is higher than on smooth ground.
         delay: share of it in which the foot only rises.
         begun: share of the gait's swing that had passed by then.
+        peak: share of it at which the foot is highest; 0 until that is settled, at its first tick.
     """
 
     start: Array3
     raised: float
     delay: float
     begun: float
+    peak: float
 
 
 class Step(Record):
@@ -158,6 +162,7 @@ def begin_swing(swing: Swing, p_foot: Array3, ground: Ground, c: RoughConfig) ->
     """A foot leaves the ground."""
     swing.start[:] = p_foot
     swing.raised, swing.delay, swing.begun = apex_raise(ground, c), delay(ground), 0.0
+    swing.peak = 0.0 if is_rough(ground) else 0.5
 
 
 @subroutine
@@ -170,6 +175,7 @@ def resume_swing(swing: Swing, p_foot: Array3, ground: Ground, progress: float) 
     if swing.begun == 0.0:
         swing.start[:] = p_foot
         swing.raised, swing.delay, swing.begun = 0.0, delay(ground), progress
+        swing.peak = 0.5
 
 
 @subroutine
@@ -185,6 +191,7 @@ def swing_foot(
     c: SwingConfig,
     progress: float,
     goal: Array3,
+    land: float,
     p: Array3,
     v: Array3,
     a: Array3,
@@ -199,7 +206,8 @@ def swing_foot(
         clock: of the gait, whose swing it is.
         c: apex and touchdown depth.
         progress: share of the gait's swing that has passed, 0 to 1.
-        goal: where the foot shall touch down [m]; may change from call to call.
+        goal: the place that the foot passes its apex above [m]; may change from call to call.
+        land: height [m] at which it shall touch down there.
     """
     share = 1.0 - swing.begun
     progress = (progress - swing.begun) / share
@@ -216,12 +224,16 @@ def swing_foot(
         a[i] = ddx / span**2 * delta
     # a gait passes the middle in whole ticks, where the acceleration changes its sign
     apex = max(start[2], goal[2]) + share * (c.apex + swing.raised)
-    is_rising = progress < 0.5 - TIE
     way = np.hypot(goal[0] - start[0], goal[1] - start[1])
     depth = c.touchdown_depth * min(1.0, c.full_depth_way / max(way, TIE)) ** 2
-    begin = start[2] if is_rising else apex
-    delta = (apex if is_rising else goal[2] - depth) - begin
-    x, dx, ddx = cubic(2.0 * progress - (0.0 if is_rising else 1.0))
+    if swing.peak == 0.0:
+        up, down = np.sqrt(apex - start[2]), np.sqrt(apex - land + depth)
+        swing.peak = up / (up + down)
+    is_rising = progress < swing.peak - TIE
+    begin, past = (start[2], 0.0) if is_rising else (apex, swing.peak)
+    delta = (apex if is_rising else land - depth) - begin
+    share = swing.peak if is_rising else 1.0 - swing.peak
+    x, dx, ddx = cubic((progress - past) / share)
     p[2] = begin + x * delta
-    v[2] = dx * delta * 2.0 / duration
-    a[2] = ddx * delta * 4.0 / duration**2
+    v[2] = dx * delta / (share * duration)
+    a[2] = ddx * delta / (share * duration) ** 2

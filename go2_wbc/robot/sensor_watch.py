@@ -57,8 +57,7 @@ changed: noise alone lets none stay for more than 8 ms, not even at rest."""
 SMOOTHING = 0.008
 """Time constant [s] of the joints' accelerations."""
 LOADED, FREE = 20.0, 10.0
-"""Force [N] by a leg's torques above which its foot stands, and below which it does not: of those
-that swing in a trot 99 % seem to bear less than 7 N."""
+"""Force [N] by a leg's torques above which its foot stands; 99 % that swing bear less than 7."""
 LANDED = 0.03
 """Time [s] for which a foot has stood that tells of the IMU: one that comes down hard slides and is
 pressed flat. In 9 minutes of reversals of 2 m/s a sound IMU was named 7 times without."""

@@ -61,6 +61,15 @@ def test_the_trunk_rises_before_its_nose_meets_the_second_of_two_stairs(seed: in
     assert climbed.values["stairs.done"] == 1.0, climbed.reason
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "seed"), [("stairs-14", 18003), ("slope", 18011)])
+def test_neither_a_slope_that_ends_nor_the_crest_of_a_ramp_throws_it(name: str, seed: int) -> None:
+    # Feet swung on above the landing, and those on the ramp slid: of 30 each fell 7, and 2.
+    way = next(way for way in WAYS if way.name == name)
+    done = measured(way, seed)
+    assert done.values[f"{name}.done"] == 1.0, done.reason
+
+
 def test_reversals_are_told_by_how_far_the_velocity_is_off(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in (("EACH", 0.5), ("ROUNDS", 1)):
         monkeypatch.setattr(rough, name, value)

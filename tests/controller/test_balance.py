@@ -118,7 +118,10 @@ def test_it_carries_a_load_over_its_feet_wherever_the_estimate_takes_them() -> N
     with GO2Controller(plant=MujocoPlant(control_period=PERIOD, payload=6.0)) as go2:
         assert go2.stand()
         go2.wait(2.5)
-        loop, tracker = go2._runner.loop, go2._runner.loop.behaviour._tracker
+        loop = go2._runner.loop
+        assert isinstance(loop.behaviour, Standing)
+        tracker = loop.behaviour._tracker
+        assert loop.snapshot.payload is not None
         assert loop.snapshot.payload[0] > 4.0
         tracker._state.landing.anchor.p_world[2] -= 0.01  # as after a trot
         go2.wait(2.0)
@@ -126,6 +129,7 @@ def test_it_carries_a_load_over_its_feet_wherever_the_estimate_takes_them() -> N
         assert tracker.anchor.p_world[2] == pytest.approx(
             feet - loop.snapshot.foot_radius, abs=5e-4
         )
+        assert loop.behaviour.sag_and_lean is not None
         assert loop.behaviour.sag_and_lean[0] < 0.002
 
 

@@ -48,6 +48,7 @@ from go2_wbc.planning.ground import (
     ground_below,
     haste,
     is_rough,
+    landing_height,
     learn_ground,
     level_friction,
     note_stumble,
@@ -142,6 +143,15 @@ def test_the_robot_goes_slowly_on_rough_ground_and_for_a_way_after_it() -> None:
     assert not is_rough(ground)
 
 
+def test_on_rough_ground_no_foot_is_led_above_the_highest_that_was_met() -> None:
+    ground = plane(on_plane(np.zeros(2)))
+    highest = ground.p_met[:, 2].max()
+    assert landing_height(ground, highest + 0.1) == highest + 0.1
+    ground.rough_way = 1.0
+    assert landing_height(ground, highest + 0.1) == highest
+    assert landing_height(ground, highest - 0.1) == highest - 0.1
+
+
 def test_the_robot_speeds_up_as_ground_and_motors_bear_it() -> None:
     level, slope = plane(on_plane(np.zeros(2))), plane(on_plane(SLOPE))
     assert haste(level, MOST_FRICTION, PROMPT, SLOW) == 1.0
@@ -188,6 +198,12 @@ def test_an_upright_cone_lies_within_that_about_the_normal_of_a_slope(friction: 
     assert level_friction(ground, 0.1, 0.12) == 0.12
     learn(ground, on_plane(SLOPE, 0.5).p_world_feet, np.ones(4, dtype=bool))
     assert level_friction(ground, friction, 0.01) == pytest.approx(friction)  # as on stairs
+    ground.rough_way, ground.slope[:] = 0.0, 2.0 * SLOPE
+    walking = on_plane(SLOPE).replaced(v_world_com=np.array([0.5, 0.0, 0.0]))
+    carry_ground(ground, CONFIG, walking, 0.0)  # a ramp: smooth and steep
+    assert level_friction(ground, friction, 0.01) < friction - 0.1  # as behind it its crest is met
+    carry_ground(ground, CONFIG, walking, FIRST_WAY / 0.5)
+    assert level_friction(ground, friction, 0.01) == pytest.approx(friction)
     assert level_friction(plane(on_plane(np.zeros(2))), friction, 0.01) == friction
 
 

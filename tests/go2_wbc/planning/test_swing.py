@@ -45,10 +45,14 @@ def swing(
     progress: float,
     duration: float = DURATION,
     delay: float = 0.0,
+    peak: float = 0.5,
+    land: float | None = None,
 ) -> tuple[np.ndarray, ...]:
-    begun, clock = Swing(start=start, delay=delay), Clock(period=2.0 * duration, duty=0.5)
+    begun = Swing(start=start, delay=delay, peak=peak)
+    clock = Clock(period=2.0 * duration, duty=0.5)
     p, v, a = np.empty((3, 3))
-    swing_foot(begun, clock, CONFIG, progress, goal, p, v, a)
+    land = goal[2] if land is None else land
+    swing_foot(begun, clock, CONFIG, progress, goal, land, p, v, a)
     return p, v, a
 
 
@@ -83,6 +87,24 @@ def test_it_passes_its_apex_half_way(start: np.ndarray, goal: np.ndarray) -> Non
     assert max(heights) <= apex + EXACT
     assert (np.diff(heights[:21]) > 0).all()
     assert (np.diff(heights[20:]) < 0).all()
+
+
+@pytest.mark.parametrize(("rise", "fall"), [(0.2, 0.0), (-0.1, 0.0), (0.1, 0.07)])
+def test_on_rough_ground_it_speeds_up_no_more_on_the_higher_of_its_ways(
+    rise: float, fall: float
+) -> None:
+    start, goal = np.zeros(3), np.array([0.1, 0.0, rise])
+    land, apex = rise - fall, max(rise, 0.0) + CONFIG.apex
+    up, down = np.sqrt([apex, apex - land + CONFIG.touchdown_depth])
+    peak = up / (up + down)
+    lifts = swing(start, goal, 0.0, peak=0.0, land=land)[2][2]
+    assert lifts == pytest.approx(6.0 * apex / (peak * DURATION) ** 2)
+    for settled, progress, z in ((0.0, LAST, land - CONFIG.touchdown_depth), (peak, peak, apex)):
+        p, v, _ = swing(start, goal, progress, peak=settled, land=land)
+        assert p[2] == pytest.approx(z, abs=1e-9)
+        assert v[2] == pytest.approx(0.0, abs=1e-9)
+    falls = swing(start, goal, peak, peak=peak, land=land)[2][2]
+    assert falls == pytest.approx(-lifts)
 
 
 @pytest.mark.parametrize("seed", range(10))
