@@ -1,10 +1,30 @@
-"""Rotation vectors and quaternions are scipy's."""
+"""Vectors are numpy's, rotation vectors and quaternions scipy's."""
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from go2_wbc.algebra.linear import quaternion_of, rotation_by, rotation_vector
+from go2_wbc.algebra.linear import (
+    cross,
+    dot,
+    plus,
+    plus_scaled,
+    quaternion_of,
+    rotation_by,
+    rotation_vector,
+    triple,
+    turned,
+    turned_back,
+)
+
+
+def test_vectors_are_added_multiplied_and_turned_as_by_numpy() -> None:
+    rng = np.random.default_rng(8)
+    a, b, R = rng.normal(size=3), rng.normal(size=3), Rotation.random(rng=rng).as_matrix()
+    u, v = triple(a), triple(b)
+    found = [plus(u, v), plus_scaled(u, 0.3, v), cross(u, v), turned(R, u), turned_back(R, u)]
+    np.testing.assert_allclose(found, [a + b, a + 0.3 * b, np.cross(a, b), R @ a, R.T @ a])
+    assert dot(u, v) == pytest.approx(a @ b)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-5, 0.3, 2.0, 3.1, np.pi - 1e-7])
