@@ -51,8 +51,8 @@ def swing(
     begun = Swing(start=start, delay=delay, peak=peak)
     clock = Clock(period=2.0 * duration, duty=0.5)
     p, v, a = np.empty((3, 3))
-    land = goal[2] if land is None else land
-    swing_foot(begun, clock, CONFIG, progress, goal, land, p, v, a)
+    to = float(goal[2]) if land is None else land
+    swing_foot(begun, clock, CONFIG, progress, goal, to, p, v, a)
     return p, v, a
 
 
