@@ -251,7 +251,7 @@ def plan(
     advance_phase(now, s, c, command, dt)
     integrate(now, s, c, command, dt)
     if s.sight.sees:
-        s.ground.rough_way = s.ground.high_way = 0.0
+        s.ground.rough_way = s.ground.high_way = s.ground.ramp_way = 0.0
     if s.is_stepping:
         adapt_gait(now, s, c, command, dt)
     stance, stands = np.ones(4, dtype=np.bool_), np.ones(4, dtype=np.bool_)
