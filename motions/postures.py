@@ -19,7 +19,7 @@ from go2_wbc.tracking.plan_curves import stand
 from motions.batch_kinematics import Wanted, attitudes, place
 
 NORMAL_FORCE_MIN = 0.0
-"""Least normal force [N] asked of a foot: none, so that a pushed robot may tip and come back."""
+"""Least normal force [N] of a foot: none, so that a pushed robot may tip and come back."""
 NORMAL_FORCE_MAX = 400.0
 """Greatest normal force [N]: 2.5 times the robot's weight, never active in slow motions."""
 LEAST_REACH = 0.03

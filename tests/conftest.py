@@ -55,6 +55,7 @@ UNCHECKED = frozenset(
         "go2_wbc.machine_code",
         "go2_wbc.numba_extensions",
         "go2_wbc.records",
+        "go2_wbc.written",
         "go2_wbc.lazy",  # loaded by the pytest plugin's package
         "go2_wbc.planning.swing",
         "go2_wbc.robot.rotations",

