@@ -26,7 +26,7 @@ from dataclasses import replace
 from math import hypot
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from controller.behaviours.plans import ChangePosture
 from controller.behaviours.walking import Walking
@@ -140,36 +140,34 @@ class Standing(ChangePosture):
                 self._steps.start(snapshot)
         if self._steps is not None:
             return _walk_on(self._steps, snapshot)
-        is_lifted = self._lifted(snapshot)
-        if snapshot.payload[0] > 0.0 and not (self.may_lie or is_lifted.any()):
+        lifted = self._lifted(snapshot)
+        if snapshot.payload[0] > 0.0 and not (self.may_lie or lifted is not None):
             self._tracker.follow_ground(snapshot, (snapshot.state.time - self._last) / SETTLING)
         reference = super().update(snapshot)
-        if is_lifted.any():
-            self._press_back(snapshot, is_lifted, Target.of(reference.row))
+        if lifted is not None:
+            self._press_back(snapshot, lifted, Target.of(reference.row))
         return reference
 
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether the posture is reached, with no step left to do."""
         return not self.is_stepping and super().is_finished(snapshot)
 
-    def _lifted(self, snapshot: Snapshot) -> Bool[np.ndarray, "4"]:
-        """Which feet something lifts: they have risen over the others since all stood."""
+    def _lifted(self, snapshot: Snapshot) -> int | None:
+        """The leg whose foot something lifts: it has risen over the others since all stood."""
         feet = snapshot.p_world_feet
         if self._places is None or self.may_lie:
             self._places = None if self.may_lie else feet.copy()
-            return np.zeros(4, dtype=bool)
-        rise = feet[:, 2] - self._places[:, 2]
-        rise -= np.median(rise)
-        return (rise > LIFTED) & (rise == rise.max())
+            return None
+        rise: list[float] = (feet[:, 2] - self._places[:, 2]).tolist()
+        _, low, high, highest = sorted(rise)
+        return rise.index(highest) if highest - 0.5 * (low + high) > LIFTED else None
 
-    def _press_back(
-        self, snapshot: Snapshot, is_lifted: Bool[np.ndarray, "4"], target: Target
-    ) -> None:
-        """Let lifted feet press towards their places, as legs in the air.
+    def _press_back(self, snapshot: Snapshot, lifted: int, target: Target) -> None:
+        """Let the lifted foot press towards its place, as a leg in the air.
 
-        What lifts them bears what they press with; the trunk is held with that reaction.
+        What lifts it bears what it presses with; the trunk is held with that reaction.
         """
-        target.legs[is_lifted] = SWING
+        target.legs[lifted] = SWING
         target.p_world_feet[:] = self._places
         target.v_world_feet[:] = -DAMPING * snapshot.v_world_feet
         target.a_world_feet[:] = STIFFNESS * (self._places - snapshot.p_world_feet)
