@@ -9,6 +9,7 @@
     ├── ModeError               a call that the present mode does not allow
     ├── ClosedError             a call after close()
     ├── BridgeError             other middleware cannot be reached or used
+    ├── StudioError             a motion's file cannot be edited as asked; it stays as it was
     ├── SweepError              a run over seeds cannot begin or go on; says what is kept
     ├── QpError
     │   ├── QpInfeasible        no solution satisfies the constraints; carries residuals
@@ -68,6 +69,10 @@ class ClosedError(Go2WbcError):
 
 class BridgeError(Go2WbcError):
     """Other middleware cannot be reached or used; says why."""
+
+
+class StudioError(Go2WbcError):
+    """A motion's file cannot be edited as asked; it stays as it was."""
 
 
 class SweepError(Go2WbcError):

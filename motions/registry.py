@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import ast
 import importlib
-import runpy
+import sys
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from go2_wbc.arguments import typed
@@ -83,20 +84,29 @@ def load_file(path: Path | str) -> Mapping[str, Motion]:
     file = Path(path)
     if not file.is_file():
         raise TimelineError(f"there is no file {file}")
-    found = {item.name: item for item in _run(file).values() if isinstance(item, Motion)}
+    if file.suffix != ".py":
+        raise TimelineError(f"{file} is not a Python file: its name must end in .py")
+    return load_text(file, file.read_bytes())
+
+
+def load_text(file: Path, data: bytes) -> Mapping[str, Motion]:
+    """The motions that ``file`` would define if it held ``data``; raises as ``load_file``."""
+    path = str(file.resolve())
     own = {
-        name: item for name, item in found.items() if item.source.startswith(str(file.resolve()))
+        item.name: item
+        for item in _run(file, path, data).values()
+        if isinstance(item, Motion) and item.source.startswith(path)
     }
     if not own:
         raise TimelineError(f"{file} defines no motion: write a function with @motion")
-    _require_own_names(file, set(own))
+    _require_own_names(file, data, set(own))
     return own
 
 
-def _require_own_names(file: Path, names: set[str]) -> None:
+def _require_own_names(file: Path, data: bytes, names: set[str]) -> None:
     """The second of two functions of one name would silently take the place of the first."""
     first_lines: dict[str, int] = {}
-    for node in ast.parse(file.read_bytes()).body:
+    for node in ast.parse(data).body:
         if isinstance(node, ast.FunctionDef) and node.name in names:
             if node.name in first_lines:
                 lines = f"lines {first_lines[node.name]} and {node.lineno}"
@@ -104,15 +114,18 @@ def _require_own_names(file: Path, names: set[str]) -> None:
             first_lines[node.name] = node.lineno
 
 
-def _run(file: Path) -> dict[str, Any]:
-    if file.suffix != ".py":
-        raise TimelineError(f"{file} is not a Python file: its name must end in .py")
+def _run(file: Path, path: str, data: bytes) -> Mapping[str, Any]:
+    """What the text sets: never cached bytecode, which would miss two saves within a second."""
+    module = ModuleType(f"_motion_file_{file.stem}")
+    module.__file__ = path
+    sys.modules[module.__name__] = module  # dataclasses look their annotations up there
     try:
-        # An import would take cached bytecode, which tells two saves within a second apart by their
-        # size only.
-        return runpy.run_path(str(file.resolve()), run_name=f"_motion_file_{file.stem}")
+        exec(compile(data, path, "exec"), vars(module))
     except Exception as error:
         raise TimelineError(f"{_place(file, error)}: {type(error).__name__}: {error}") from error
+    finally:
+        sys.modules.pop(module.__name__, None)
+    return vars(module)
 
 
 def _place(file: Path, error: Exception) -> str:

@@ -165,6 +165,8 @@ class ReplayContent:
         sound: an MP3 file that starts with the recording, played in step with it; empty for none.
         end_pose: where the movement shall end: x, y [m] and yaw [rad] of the frame of the feet.
         bar: beats of a bar, and the number of the beat on which the first begins.
+        editor: what a page that edits the motion's file shows of it, as for JSON; see
+            ``controller.studio``.
     """
 
     recording: Recording
@@ -177,6 +179,7 @@ class ReplayContent:
     sound: bytes = b""
     end_pose: tuple[float, float, float] | None = None
     bar: tuple[int, int] = (4, 0)
+    editor: Mapping[str, object] | None = None
 
     __repr__ = brief
 

@@ -63,6 +63,7 @@ COMMANDS = tuple(
         ("replay", "sweep:replay_command", "a row of a motion's sweep, run again and shown"),
         ("ros2", "bridges:ros2", "the simulated robot as a ROS 2 node"),
         ("run", "motion_run", "check a motion, then play it in MuJoCo"),
+        ("studio", "studio", "design a motion with the hand, in the browser"),
         ("sweep", "sweep:sweep_command", "a motion, a gait or a function over many seeds"),
         ("teleop", "teleop", "drive the robot with the keyboard"),
         ("unitree-drive", "bridges:unitree_drive", "drive a Go2 through its low level"),

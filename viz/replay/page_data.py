@@ -274,6 +274,7 @@ def content_text(content: ReplayContent, title: str, version: str = "") -> str:
         "end_pose": content.end_pose,
         "has_sound": bool(content.sound),
         "sliders": [asdict(slider) for slider in content.sliders],
+        "editor": content.editor,
         "verdict": None,
         "ghost": None,
         "ground": None,
@@ -417,14 +418,20 @@ def replay_html(shown: Recording | ReplayContent, *, title: str) -> str:
     return page
 
 
-def page_text(title: str, scene: str, data: str, *, is_live: bool = False) -> str:
-    """The page of a packed scene and what happens in it; a live one listens to its server."""
-    scripts = f"{_SCRIPTS} live" if is_live else _SCRIPTS
+def page_text(
+    title: str, scene: str, data: str, *, is_live: bool = False, is_editor: bool = False
+) -> str:
+    """The page of a packed scene and what happens in it.
+
+    A live one listens to its server; an editor has bars besides, and needs ``content.editor``.
+    """
+    names = [f"replay_{name}" for name in _SCRIPTS.split()]
+    names += ["replay_live"] * is_live + ["studio_tracks", "studio_inspector", "studio"] * is_editor
     bundle = Path(meshcat.viewer_assets_path()) / "dist" / "main.min.js"
     parts = {
         "TITLE": html.escape(title),
-        "STYLE": _asset("replay.css"),
-        "SCRIPT": "\n".join(_asset(f"replay_{name}.js") for name in scripts.split()),
+        "STYLE": _asset("replay.css") + (_asset("studio.css") if is_editor else ""),
+        "SCRIPT": "\n".join(_asset(f"{name}.js") for name in names),
         "MESHCAT": compressed_text(bundle.read_bytes()),
         "SCENE": scene,
         "DATA": data,

@@ -2,11 +2,13 @@
 
 Bound to the loopback address, so that no other machine reaches it; and requests whose ``Host`` is
 not the loopback's are refused, so that no web site reaches it through a name of its own that it
-points at this machine (DNS rebinding).
+points at this machine (DNS rebinding). A page that may do more than choose values needs a token,
+which other users of this machine do not know.
 """
 
 from __future__ import annotations
 
+import hmac
 import json
 import logging
 import threading
@@ -15,7 +17,8 @@ from collections.abc import Callable, Mapping
 from datetime import datetime
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import final
+from typing import Any, final
+from urllib.parse import parse_qs, urlsplit
 
 from go2_wbc.errors import ConfigError
 from viz.content import ReplayContent, checked_content
@@ -28,11 +31,14 @@ LOOPBACK_NAMES = (LOOPBACK, "localhost", "[::1]")
 _HEARTBEAT = 10.0
 """A page that hears nothing for so long [s] gets an empty line, which finds closed pages."""
 _MOST_SENT = 4096  #: Longest text [bytes] that a page may send
+TOKEN_HEADER = "X-Studio-Token"
 Values = dict[str, float | str]  #: What was chosen for parameters, by their names
+Action = Callable[[Mapping[str, object]], Mapping[str, object]]  #: Answers JSON with JSON
 _HEADERS = {
     "Cache-Control": "no-store",
     "Content-Security-Policy": "default-src 'self' 'unsafe-inline' data: blob:",
     "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
 }
@@ -59,6 +65,9 @@ class PreviewServer(ThreadingHTTPServer):
         title: str,
         port: int,
         on_values: Callable[[Values], None] | None = None,
+        *,
+        token: str = "",
+        actions: Mapping[str, Action] | None = None,
     ) -> None:
         """Bind and serve in the background.
 
@@ -69,12 +78,16 @@ class PreviewServer(ThreadingHTTPServer):
             on_values: called from a thread of the server with what was chosen on the page for the
                 content's sliders; nothing about it has been checked but that it is names with
                 numbers or words.
+            token: what requests must bring, in the address or the header ``TOKEN_HEADER``.
+            actions: by their paths, what else a page may ask for, which then edits; called from
+                threads of the server.
 
         Raises:
             ConfigError: if the port is in use or out of range, or for a recording that cannot be
                 drawn.
         """
         self._title, self.on_values = title, on_values
+        self.token, self.actions = token, actions or {}
         self._scene = scene_text(content.recording)
         self._changed = threading.Condition()
         self._is_open = True
@@ -123,7 +136,9 @@ class PreviewServer(ThreadingHTTPServer):
 
     def page(self) -> str:
         """The page with what it shows now."""
-        return page_text(self._title, self._scene, self.data, is_live=True)
+        return page_text(
+            self._title, self._scene, self.data, is_live=True, is_editor=bool(self.actions)
+        )
 
     def next_state(self, seen: str | None) -> str | None:
         """Wait for another state than ``seen``; "" if there is none for long.
@@ -165,24 +180,31 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Answer one request."""
-        if not self._is_own(self.headers.get("Host", "")):
-            self._refuse("only for this machine", HTTPStatus.FORBIDDEN)
-        elif self.path == "/":
+        path = urlsplit(self.path).path
+        if not self._is_allowed():
+            pass
+        elif path == "/":
             self._answer(self.server.page(), "text/html")
-        elif self.path == "/data":
+        elif path == "/data":
             self._answer(self.server.data, "text/plain")
-        elif self.path == "/events":
+        elif path == "/events":
             self._stream()
         else:
             self._refuse("not here", HTTPStatus.NOT_FOUND)
 
     def do_POST(self) -> None:
-        """Take values for the parameters, from a page of this server only."""
-        on_values = self.server.on_values
+        """Take values for the parameters, or an order, from a page of this server only."""
+        path, on_values = urlsplit(self.path).path, self.server.on_values
         origin = self.headers.get("Origin", "").removeprefix("http://")
-        if not (self._is_own(self.headers.get("Host", "")) and self._is_own(origin)):
-            self._refuse("only for this machine", HTTPStatus.FORBIDDEN)
-        elif self.path != "/parameters" or on_values is None:
+        if not self._is_allowed(is_from_page=self._is_own(origin)):
+            pass
+        elif path in self.server.actions:
+            if isinstance(order := self._sent(), dict):
+                answer = json.dumps(self.server.actions[path](order))
+                self._answer(answer, "application/json")
+            else:
+                self._refuse("needs an object, as JSON", HTTPStatus.BAD_REQUEST)
+        elif path != "/parameters" or on_values is None:
             self._refuse("not here", HTTPStatus.NOT_FOUND)
         elif (values := self._values()) is None:
             self._refuse("needs names with numbers or words, as JSON", HTTPStatus.BAD_REQUEST)
@@ -190,21 +212,37 @@ class _Handler(BaseHTTPRequestHandler):
             on_values(values)
             self._answer("", "text/plain")
 
+    def _is_allowed(self, *, is_from_page: bool = True) -> bool:
+        """Whether the request comes from this machine, and brings the token; else it is refused."""
+        if not (self._is_own(self.headers.get("Host", "")) and is_from_page):
+            self._refuse("only for this machine", HTTPStatus.FORBIDDEN)
+            return False
+        given = parse_qs(urlsplit(self.path).query).get("token", [""])[0]
+        token = self.headers.get(TOKEN_HEADER, given)
+        if not hmac.compare_digest(token.encode(), self.server.token.encode()):
+            self._refuse("open the address that the terminal shows", HTTPStatus.FORBIDDEN)
+            return False
+        return True
+
     def _is_own(self, host: str) -> bool:
         return host in {f"{name}:{self.server.server_port}" for name in LOOPBACK_NAMES}
 
     def _refuse(self, why: str, status: HTTPStatus) -> None:
         self._answer(f"{why}\n", "text/plain", status)
 
-    def _values(self) -> Values | None:
-        """What was sent, if it is values."""
+    def _sent(self) -> Any:  # noqa: ANN401 - whatever JSON holds
+        """What was sent as JSON; None for anything else."""
         length = self.headers.get("Content-Length", "")
         if not length.isdecimal() or int(length) > _MOST_SENT:
             return None
         try:
-            values = json.loads(self.rfile.read(int(length)))
+            return json.loads(self.rfile.read(int(length)))
         except ValueError:
             return None
+
+    def _values(self) -> Values | None:
+        """What was sent, if it is values."""
+        values = self._sent()
         is_one = isinstance(values, dict) and all(
             isinstance(value, int | float | str) and not isinstance(value, bool)
             for value in values.values()

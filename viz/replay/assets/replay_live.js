@@ -59,7 +59,7 @@ class Sliders {
     for (const [name, { input, isWord }] of this.inputs) {
       values[name] = isWord ? input.value : Number(input.value);
     }
-    fetch("parameters", {
+    fetch(`parameters${location.search}`, {
       method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(values),
     });
   }
@@ -68,6 +68,7 @@ class Sliders {
 function listen(player) {
   const sliders = new Sliders();
   sliders.use(player.data.header);
+  const studio = typeof Studio === "function" ? new Studio(player) : null;
   const box = document.getElementById("error");
   const showError = (title, text, isQuiet = false) => {
     box.hidden = !title;
@@ -76,14 +77,15 @@ function listen(player) {
     box.querySelector("pre").textContent = text;
   };
   let version = player.data.header.version;
-  const events = new EventSource("events");
+  const events = new EventSource(`events${location.search}`);
   events.onmessage = async ({ data }) => {
     const state = JSON.parse(data);
     if (state.version !== version) {
-      const answer = await fetch("data");
+      const answer = await fetch(`data${location.search}`);
       player.use(new ReplayData(await unpack(await answer.text()), player.data.scene));
       version = player.data.header.version;
       sliders.use(player.data.header);
+      studio?.use(player.data.header.editor);
     }
     if (state.error) showError(state.title, state.error);
     else showError("", "");

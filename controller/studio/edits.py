@@ -1,0 +1,96 @@
+"""What a page may ask for: edits as data. Code never comes from there; calls are written here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from controller.studio.source import Site, Source
+from go2_wbc.errors import StudioError, unknown_name
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """A call that can be put into a motion."""
+
+    title: str  #: on the page
+    call: str  #: name of the method
+    arguments: Mapping[str, float | str]  #: what it is called with at first
+
+    def code(self, source: Source) -> str:
+        """It as text of this file."""
+        given = ", ".join(source.argument(name, value) for name, value in self.arguments.items())
+        return f".{self.call}({given})"
+
+
+PALETTE: Mapping[str, Template] = MappingProxyType(
+    {
+        template.title: template
+        for template in (
+            Template("Move the trunk", "body", {"z": -0.03, "over": 0.6}),
+            Template("Tilt the trunk", "body", {"pitch": 10.0, "over": 0.6}),
+            Template("Turn the trunk", "body", {"yaw": 10.0, "over": 0.6}),
+            Template("Take a pose", "pose", {"name": "bow", "over": 0.8}),
+            Template("Look at a place", "look_at", {"x": 1.0, "y": 0.3, "z": 0.4, "over": 0.6}),
+            Template("Pause", "hold", {"seconds": 0.5}),
+            Template("Raise a foot", "foot", {"leg": "FR", "z": 0.08, "over": 0.5}),
+            Template("Put a foot down", "down", {"leg": "FR", "over": 0.5}),
+            Template("All home", "home", {"over": 0.8}),
+            Template("Step with a foot", "step", {"leg": "FR", "x": 0.05, "over": 0.5}),
+            Template("Walk", "walk", {"x": 0.2}),
+            Template("Turn round", "turn", {"angle": 20.0}),
+            Template("Jump", "jump", {"height": 0.1}),
+        )
+    }
+)
+"""The calls that a page offers, by their titles."""
+
+
+def edited(source: Source, order: Mapping[str, object]) -> Source:
+    """The text after one edit.
+
+    Args:
+        source: the text that is saved.
+        order: ``op``, ``site`` of the call, and what the edit needs: ``name``, ``value`` and the
+            ``number`` of the run, ``title`` of a template, or ``step``.
+
+    Raises:
+        StudioError: for an order that is not one, or an edit that cannot be made.
+    """
+    op, site = order.get("op"), order.get("site")
+    if not isinstance(op, str) or op not in _EDITS:
+        raise StudioError(unknown_name("edit", str(op), _EDITS))
+    if not (isinstance(site, list) and len(site) == 2 and all(type(n) is int for n in site)):
+        raise StudioError(f"an edit needs the place of a call, got {site!r:.80}")
+    return _EDITS[op](source, (site[0], site[1]), order)
+
+
+def _set(source: Source, site: Site, order: Mapping[str, object]) -> Source:
+    name, value = order.get("name"), order.get("value")
+    is_value = isinstance(value, int | float | str) and not isinstance(value, bool)
+    if not isinstance(name, str) or not is_value:
+        raise StudioError(f"an argument needs a number or a word, got {name!r:.40} {value!r:.40}")
+    number = order.get("number")
+    number = number if type(number) is int else 0
+    return source.set(site, name, value, number)  # pyright: ignore[reportArgumentType]
+
+
+def _insert(source: Source, site: Site, order: Mapping[str, object]) -> Source:
+    title = order.get("title")
+    if not isinstance(title, str) or title not in PALETTE:
+        raise StudioError(unknown_name("move", str(title), PALETTE))
+    return source.insert(site, PALETTE[title].code(source))
+
+
+def _swap(source: Source, site: Site, order: Mapping[str, object]) -> Source:
+    return source.swap(site, -1 if order.get("step") == -1 else 1)
+
+
+_EDITS: Mapping[str, Callable[[Source, Site, Mapping[str, object]], Source]] = {
+    "set": _set,
+    "insert": _insert,
+    "swap": _swap,
+    "delete": lambda source, site, _: source.delete(site),
+    "duplicate": lambda source, site, _: source.duplicate(site),
+}

@@ -1,0 +1,60 @@
+"""What the process that runs an author's file is told, and what it answers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from controller.studio.source import Slot
+from motions.authoring import Value
+
+if TYPE_CHECKING:
+    from viz.content import ReplayContent
+
+
+class Task(Enum):
+    """What is to be done with a motion."""
+
+    CHECK = "check"
+    PLAY = "play"  #: in MuJoCo, beside the plan
+    MEND = "mend"  #: look for changes that make it possible
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """A text that is to be run."""
+
+    path: Path  #: of the file
+    data: bytes  #: that it holds or would hold
+    motion: str | None  #: which of its motions; None for its only one
+    values: Mapping[str, Value]  #: chosen parameters
+    task: Task = Task.CHECK  #: what is done with it
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """A call of the file and the span of the motion that it has written."""
+
+    name: str  #: of the method
+    site: tuple[int, int]  #: where it ends; (0, 0) in another file
+    runs: int  #: how often the call runs
+    number: int  #: which of the runs it is
+    span: tuple[float, float, float]  #: when [s] it starts, its move starts, and it ends
+    parts: tuple[str, ...]  #: what it moves: legs, "trunk", "robot" or "time"
+    broken: str  #: the first limit that is broken there, in words; empty if none is
+    slots: tuple[Slot, ...]  #: the arguments that are written in it
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What came of an order."""
+
+    motion: str  #: name of the motion
+    content: ReplayContent | None = None  #: the plan with its verdict, and how it was played
+    bars: tuple[Bar, ...] = ()  #: by their starts
+    told: str = ""  #: how playing went, in words
+    changes: tuple[tuple[str, str], ...] = ()
+    """Calls that make it possible, to be appended to the motion, each with its meaning."""

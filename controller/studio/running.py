@@ -1,0 +1,75 @@
+"""Has an author's file run in a process of its own, where its motion is checked and played.
+
+A file that never ends is ended there, and what it breaks is not the studio. The text need not be
+saved: while a bar is dragged, the text as it would be runs.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import threading
+from typing import cast, final
+
+from controller.studio.orders import Answer, Order
+from controller.studio.working import serve
+from go2_wbc.errors import StudioError
+
+LONGEST_RUN = 2.0
+"""Time [s] that a file may take to make its motion: own choice, the library's take 10 ms."""
+LONGEST_WORK = 120.0  #: Time [s] that solving, checking or playing may take
+
+
+@final
+class Runner:
+    """Has texts run, one after the other."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._start()
+
+    def _start(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._pipe, there = context.Pipe()
+        self._process = context.Process(target=serve, args=(there,), daemon=True)
+        self._process.start()
+        there.close()
+        self._is_warm = False
+
+    def run(self, order: Order) -> Answer:
+        """What came of the order.
+
+        Raises:
+            StudioError: if the text is no motion, says the line; if it takes too long, or ends the
+                process: the next one runs in another.
+        """
+        with self._lock:
+            try:
+                self._pipe.send(order)
+                if not self._is_warm:  # importing the robot takes its time
+                    self._received(LONGEST_WORK, "could not be loaded")
+                    self._is_warm = True
+                self._received(LONGEST_RUN, f"ran for longer than {LONGEST_RUN:g} s")
+                answer = self._received(LONGEST_WORK, f"was at it for {LONGEST_WORK:g} s")
+            except (EOFError, OSError) as error:
+                self._restart()
+                name = order.path.name
+                raise StudioError(f"{name} has ended the process that runs it") from error
+        if isinstance(answer, StudioError):
+            raise answer
+        return cast("Answer", answer)
+
+    def _received(self, patience: float, otherwise: str) -> object:
+        if not self._pipe.poll(patience):
+            self._restart()
+            raise StudioError(f"the file {otherwise}; it was stopped")
+        return self._pipe.recv()
+
+    def _restart(self) -> None:
+        self.close()
+        self._start()
+
+    def close(self) -> None:
+        """End the process."""
+        self._process.kill()
+        self._process.join()
+        self._pipe.close()

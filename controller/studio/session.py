@@ -1,0 +1,205 @@
+"""A studio that is open: the file, what runs it, and the page."""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import final
+
+from controller.studio.edits import PALETTE, edited
+from controller.studio.orders import Answer, Bar, Order, Task
+from controller.studio.project import Project
+from controller.studio.running import Runner
+from controller.studio.source import Source, parameters
+from go2_wbc.curves import Ease
+from go2_wbc.errors import StudioError
+from go2_wbc.legs import LEGS
+from motions.authoring import Value
+from motions.language.body_and_feet import POSES
+from motions.language.steps import STEP_GAITS
+from viz.content import ReplayContent
+from viz.replay.page_data import content_text
+from viz.replay.preview_server import PreviewServer
+
+HISTORY = ("undo", "redo")
+WORDS: Mapping[str, Sequence[str]] = {
+    "leg": [leg.name for leg in LEGS],
+    "ease": [ease.value for ease in Ease],
+    "frame": ["ground", "body"],
+    "gait": list(STEP_GAITS),
+    "name": list(POSES),
+    "joint": ["hip", "thigh", "calf"],
+}
+"""Words that arguments may be; others can be written in the file."""
+
+
+@final
+class Studio:
+    """A context manager: serves the page of one motion, and edits its file as the page asks.
+
+    Attributes:
+        url: of the page, with the token that the page sends back.
+        motion: the name of the motion.
+    """
+
+    def __init__(self, path: Path, motion: str | None, port: int) -> None:
+        """Run the file and serve its page.
+
+        Args:
+            path: of the file.
+            motion: which of its motions; the first one by default.
+            port: 0 for any that is free.
+
+        Raises:
+            StudioError: if the file cannot be read, or is no motion.
+            ConfigError: if the port cannot be used.
+        """
+        self._project, self._values = Project(path), dict[str, Value]()
+        self._lock, self.motion = threading.RLock(), motion
+        self._runner, self._player = Runner(), Runner()
+        self._changes: tuple[str, ...] = ()
+        try:
+            shown = self._run(self._project.saved)
+            self.motion = shown.motion
+            token = secrets.token_urlsafe(16)
+            self._server = PreviewServer(
+                self._content(shown),
+                shown.motion,
+                port,
+                self._choose,
+                token=token,
+                actions={"/edit": self.edit, "/play": self.play, "/mend": self.mend},
+            )
+        except BaseException:
+            self._end()
+            raise
+        self.url = f"{self._server.url}?token={token}"
+
+    def edit(self, order: Mapping[str, object]) -> dict[str, object]:
+        """Do what a page asks for.
+
+        Args:
+            order: see ``edited``; besides ``op`` "undo" and "redo". ``base`` is the state of the
+                file that the page knows, ``commit`` whether to save.
+
+        Returns:
+            What the page shows next, packed; or why nothing was done.
+        """
+        with self._lock:
+            try:
+                if self._project.refresh():
+                    self.show()
+                if order.get("op") not in HISTORY and order.get("base") != self._base:
+                    raise StudioError("the file was saved elsewhere: this is what it says now")
+                return self._done(order)
+            except StudioError as error:
+                return {"error": str(error)}
+
+    def _done(self, order: Mapping[str, object]) -> dict[str, object]:
+        if (op := order.get("op")) in HISTORY:
+            (self._project.undo if op == "undo" else self._project.redo)()
+            self.show()
+            return {}
+        data = self._edited(order)
+        shown = self._run(data)  # what is no motion is not saved
+        if order.get("commit") is True:
+            self._project.save(data)
+            self._server.publish(self._content(shown))
+            return {}
+        return {"data": content_text(self._content(shown), shown.motion)}
+
+    def _edited(self, order: Mapping[str, object]) -> bytes:
+        source = Source(self._project.saved)
+        if order.get("op") != "change":
+            return edited(source, order).data
+        which = order.get("which")
+        if type(which) is not int or not 0 <= which < len(self._changes):
+            raise StudioError("a change is one of those that were proposed")
+        return source.append(self.motion or "", self._changes[which]).data
+
+    def play(self, _: Mapping[str, object]) -> dict[str, object]:
+        """The motion as it is saved, in MuJoCo beside the plan; or why it could not be played."""
+        try:
+            shown = self._run(self._project.saved, Task.PLAY)
+        except StudioError as error:
+            return {"error": str(error)}
+        return {"data": content_text(self._content(shown), shown.motion), "told": shown.told}
+
+    def mend(self, _: Mapping[str, object]) -> dict[str, object]:
+        """What would make the motion possible, as it is saved; taken by ``op`` "change"."""
+        try:
+            found = self._run(self._project.saved, Task.MEND).changes
+        except StudioError as error:
+            return {"error": str(error)}
+        self._changes = tuple(call for call, _ in found)
+        return {"changes": found}
+
+    def look(self) -> bool:
+        """Show what somebody else has saved; whether somebody has."""
+        with self._lock:
+            try:
+                if not self._project.refresh():
+                    return False
+            except StudioError as error:
+                self._server.publish_error(str(error))
+                return False
+            self.show()
+            return True
+
+    def show(self) -> None:
+        """Run what the file says and show it, or why it is no motion."""
+        try:
+            self._server.publish(self._content(self._run(self._project.saved)))
+        except StudioError as error:
+            self._server.publish_error(str(error))
+
+    def __enter__(self) -> Studio:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._server.close()
+        self._end()
+
+    def _end(self) -> None:
+        self._runner.close()
+        self._player.close()
+
+    @property
+    def _base(self) -> str:
+        return hashlib.sha256(self._project.saved).hexdigest()
+
+    def _choose(self, values: dict[str, Value]) -> None:
+        with self._lock:
+            self._values = values
+            self.show()
+
+    def _run(self, data: bytes, task: Task = Task.CHECK) -> Answer:
+        order = Order(self._project.path, data, self.motion, self._values, task)
+        return (self._runner if task is Task.CHECK else self._player).run(order)
+
+    def _content(self, shown: Answer) -> ReplayContent:
+        bars = [_bar(bar) for bar in shown.bars]
+        editor = {
+            "bars": bars,
+            "file": self._project.path.name,
+            "base": self._base,
+            "undo": self._project.can_undo,
+            "redo": self._project.can_redo,
+            "palette": list(PALETTE),
+            "words": WORDS,
+            "lanes": ["trunk", *(leg.name for leg in LEGS), "robot", "time"],
+        }
+        if shown.content is None:
+            raise StudioError("there is nothing to show")
+        return replace(shown.content, editor=editor)
+
+
+def _bar(bar: Bar) -> dict[str, object]:
+    """A bar as the page needs it, with the arguments that could be added."""
+    given = {slot.name for slot in bar.slots}
+    more = [name for name in parameters(bar.name) if name not in given]
+    return {**asdict(bar), "more": more}

@@ -1,0 +1,124 @@
+"""In the process that runs an author's file: its motion is made, checked, played or mended."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import closing, suppress
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from typing import TYPE_CHECKING
+
+from controller.studio.orders import Answer, Bar, Order, Task
+from controller.studio.source import Source
+from go2_wbc.errors import Go2WbcError, StudioError
+from go2_wbc.legs import LEGS
+
+if TYPE_CHECKING:
+    from motions import CheckedMotion, FeasibilityChecker
+    from motions.language.tracing import CallMark
+    from viz.content import ReplayContent
+
+
+def serve(pipe: Connection) -> None:
+    """Answer orders: a word once the robot is loaded, one when the file has run, and the answer."""
+    with suppress(EOFError, KeyboardInterrupt):
+        order: Order = pipe.recv()
+        from motions import FeasibilityChecker
+
+        checker = FeasibilityChecker()
+        pipe.send("loaded")
+        while True:
+            pipe.send(_answer(order, checker, pipe))
+            order = pipe.recv()
+
+
+def _answer(order: Order, checker: FeasibilityChecker, pipe: Connection) -> Answer | StudioError:
+    from controller.report_view import planned, slider
+    from motions import suggest
+    from motions.language.tracing import separated, traced
+    from motions.registry import load_text
+
+    has_run = False
+    try:
+        with traced():
+            own = load_text(order.path, order.data)
+            motion = own.get(order.motion or "", next(iter(own.values())))
+            known = {item.name: item for item in motion.parameters}
+            values = {name: value for name, value in order.values.items() if name in known}
+            line, marks = separated(motion(**values))
+        pipe.send("made")
+        has_run = True
+        if order.task is Task.MEND:
+            found = suggest(line, checker=checker)
+            changes = tuple((item.call, item.meaning) for item in found)
+            return Answer(motion.name, changes=changes)
+        checked = checker.evaluate(line)
+        if order.task is Task.PLAY:
+            content, told = _played(checked, checker)
+        else:
+            content, told = planned(checked), ""
+    except (Go2WbcError, SystemExit) as error:
+        if not has_run:
+            pipe.send("failed")
+        is_ours = isinstance(error, Go2WbcError)
+        return StudioError(str(error) if is_ours else "the file ends the program")
+    sliders = tuple(slider(item, values.get(item.name, item.default)) for item in motion.parameters)
+    bars = tuple(_bars(Source(order.data), str(order.path), marks, content))
+    return Answer(motion.name, replace(content, sliders=sliders), bars, told)
+
+
+def _played(checked: CheckedMotion, checker: FeasibilityChecker) -> tuple[ReplayContent, str]:
+    """The motion in MuJoCo, in the world that it was checked for, and how that went."""
+    from controller.go2_controller import GO2Controller
+    from controller.motion_measurement import measure_motion
+    from controller.report_view import performed
+    from go2_wbc.motion_plan import Posture
+    from go2_wbc.plant import plant_in_world
+    from go2_wbc.plant.mujoco.ground_truth import GroundTruth
+
+    with (
+        closing(GroundTruth(plant_in_world(checker.world))) as truth,
+        GO2Controller(plant=truth) as go2,
+    ):
+        is_ready = go2.sit() if checked.plan.entry is Posture.SIT else go2.stand()
+        if not is_ready:
+            raise StudioError(f"the robot did not get ready: {go2.last_outcome.reason}")
+        result = measure_motion(go2, truth, checked.plan, checker.model)
+        content = performed(checked, go2.recording(), checker.model)
+    why = result.fall or result.reason
+    share = f"{100 * result.torque:.0f} % of the torque, {100 * result.speed:.0f} % of the speed"
+    return content, f"played in MuJoCo: done, {share}" if result.ok else f"NOT done: {why}"
+
+
+def _bars(
+    source: Source, path: str, marks: Sequence[CallMark], content: ReplayContent
+) -> Iterator[Bar]:
+    runs = Counter((mark.call.file, mark.call.site) for mark in marks)
+    for mark in marks:
+        call = mark.call
+        is_here = call.file == path
+        parts = tuple(part if isinstance(part, str) else part.name for part in mark.parts)
+        yield Bar(
+            call.name,
+            call.site if is_here else (0, 0),
+            runs[call.file, call.site],
+            call.number,
+            (mark.start, max(mark.move, mark.start), mark.end),
+            parts,
+            _broken(content, mark.start, mark.end, parts),
+            tuple(source.slots(call.site, call.number)) if is_here else (),
+        )
+
+
+def _broken(content: ReplayContent, start: float, end: float, parts: Sequence[str]) -> str:
+    """The first limit that is broken by these parts while they move."""
+    found = content.verdict.annotations if content.verdict is not None else ()
+    for item in sorted(found, key=lambda one: one.time):
+        legs = {part.partition("_")[0] for part in item.parts} & {leg.name for leg in LEGS}
+        concerns = (
+            not legs or bool(legs & set(parts)) or not set(parts) & {leg.name for leg in LEGS}
+        )
+        if item.is_broken and concerns and any(a < end and start < b for a, b in item.spans):
+            return f"{item.limit}, {item.subject}: {item.text}"
+    return ""

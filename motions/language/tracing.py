@@ -1,0 +1,154 @@
+"""Which call of an author's file wrote which part of a timeline, for who edits the file.
+
+While ``traced``, every public call of a ``Timeline`` leaves a ``CallMark`` among its keys, which
+the calls after it shift, stretch and mirror with the others; ``separated`` takes them out again. A
+call is known by where it ends in its file: chained calls start at the same place, and no two end at
+one (``co_positions``, PEP 657).
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from inspect import signature
+from itertools import islice
+from types import CodeType
+from typing import Any, ClassVar
+
+from go2_wbc.curves import Ease
+from go2_wbc.legs import Leg
+from motions.language.keys import BalanceShift, BodyKey, Key, LegKey, Mark, PhaseKey, StepKey
+from motions.language.timeline import Timeline
+from motions.language.timeline_data import TimelineData
+
+TRUNK, ROBOT, TIME = "trunk", "robot", "time"
+"""What a call that moves no single foot belongs to: a jump is of the whole robot, a pause, a tempo
+or what is made of a motion as a whole of time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A call that has run."""
+
+    name: str  #: of the method
+    file: str  #: that it is written in
+    site: tuple[int, int]  #: line from 1, column [bytes of UTF-8] from 0 at which it ends
+    number: int  #: how often this call had run before
+    arguments: dict[str, object]  #: those that were given, by the names of the parameters
+
+
+@dataclass(frozen=True, slots=True)
+class CallMark(Mark):
+    """The span that a call has written."""
+
+    moves: ClassVar[str] = "call {0.name}"
+    instants: ClassVar[tuple[str, ...]] = ("start", "move", "end")
+
+    move: float  #: when [s] its move starts: before it the trunk shifts over the feet that stay
+    parts: tuple[Leg | str, ...]  #: what it moves: legs, ``TRUNK``, ``ROBOT``, or ``TIME``
+    call: Call  #: which
+
+    @property
+    def track(self) -> str:
+        """One of its own: calls that run at once do not exclude each other."""
+        return f"call {id(self)}"
+
+
+def separated(line: Timeline) -> tuple[Timeline, list[CallMark]]:
+    """The timeline without the marks, and these by their starts."""
+    keys = tuple(key for key in line.keys if not isinstance(key, CallMark))
+    return replace(line, keys=keys), line.in_order(CallMark)
+
+
+@contextmanager
+def traced() -> Iterator[None]:
+    """Have calls leave marks; not for two threads at once."""
+    methods: dict[str, Callable[..., Any]] = {
+        name: method
+        for kind in reversed(Timeline.__mro__)
+        for name, method in vars(kind).items()
+        if kind not in (object, TimelineData)
+        if callable(method) and not name.startswith("_")
+    }
+    runs, is_inside = Counter[tuple[str, tuple[int, int]]](), False
+
+    def tracing(name: str, method: Callable[..., Any]) -> Callable[..., Timeline]:
+        names = signature(method)
+
+        @functools.wraps(method)
+        def call(*args: Any, **kwargs: Any) -> Timeline:  # noqa: ANN401 - as the method says
+            nonlocal is_inside
+            if is_inside:  # a call that is made of others is one
+                return method(*args, **kwargs)
+            is_inside = True
+            try:
+                after = method(*args, **kwargs)
+            finally:
+                is_inside = False
+            given = dict(names.bind(*args, **kwargs).arguments)
+            before = given.pop("self")
+            frame = sys._getframe(1)
+            place = (frame.f_code.co_filename, _end_of(frame.f_code, frame.f_lasti))
+            done = Call(name, *place, runs[place], given)
+            runs[place] += 1
+            return replace(after, keys=(*after.keys, _mark(before, after, done)))
+
+        return call
+
+    for name, method in methods.items():
+        setattr(Timeline, name, tracing(name, method))
+    try:
+        yield
+    finally:
+        own = vars(Timeline)
+        for name, method in methods.items():
+            if getattr(own[name], "__wrapped__", None) is method and name not in _OWN:
+                delattr(Timeline, name)
+            else:
+                setattr(Timeline, name, method)
+
+
+_OWN = frozenset(vars(Timeline))  #: What is defined there, not inherited
+
+
+@functools.lru_cache(maxsize=256)
+def _ends(code: CodeType) -> tuple[tuple[int, int], ...]:
+    return tuple((end or 0, column or 0) for _, end, _, column in code.co_positions())
+
+
+def _end_of(code: CodeType, instruction: int) -> tuple[int, int]:
+    return next(islice(_ends(code), instruction // 2, None))
+
+
+def _mark(before: Timeline, after: Timeline, call: Call) -> CallMark:
+    """What ``call`` has added; all there is if it has made another motion of it."""
+    known = {id(key) for key in before.keys}
+    new = [key for key in after.keys if id(key) not in known and not isinstance(key, CallMark)]
+    made = [key for key in after.keys if not isinstance(key, CallMark)]
+    is_whole = len(made) - len(new) < sum(not isinstance(key, CallMark) for key in before.keys)
+    if is_whole or (call.name in _JOINING and new):
+        new, parts = made, {TIME}
+    else:
+        parts = {part for key in new for part in _parts(key)} or {TRUNK if new else TIME}
+    start = min([key.start for key in new], default=min(before.cursor, after.cursor))
+    end = max([key.end for key in new], default=max(before.cursor, after.cursor))
+    moves = [key.start for key in new if not isinstance(key, BalanceShift)]
+    in_order = tuple(sorted(parts, key=str))
+    return CallMark(start, end, Ease.LINEAR, call.name, min(moves, default=start), in_order, call)
+
+
+_JOINING = frozenset({"then", "together", "repeat", "loop"})
+
+
+def _parts(key: Key) -> tuple[Leg | str, ...]:
+    if isinstance(key, LegKey | StepKey):
+        return (key.leg,)
+    if isinstance(key, BodyKey):
+        return (TRUNK,)
+    if isinstance(key, PhaseKey):
+        return (ROBOT,)
+    return (TIME,) if isinstance(key, Mark) else ()

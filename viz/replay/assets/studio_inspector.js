@@ -1,0 +1,104 @@
+"use strict";
+// The arguments of the chosen call: numbers with their units, words, and what is computed.
+
+const DRAFT_REST = 60; // ms after the last key that a draft is shown
+const LENGTHS = ["x", "y", "z", "height", "reach"];
+
+class Inspector {
+  constructor(studio) {
+    this.studio = studio;
+    this.box = element("section", { id: "inspector", className: "card" });
+    this.box.append(element("h2"), element("div"));
+  }
+
+  use(bar, editor, timeUnit) {
+    if (this.box.contains(document.activeElement) && bar && this.shape === shapeOf(bar)) {
+      return this.refresh(bar);
+    }
+    this.shape = bar ? shapeOf(bar) : "";
+    const [title, rows] = this.box.children;
+    if (!bar) {
+      title.textContent = "Choose a bar, or insert a move";
+      return rows.replaceChildren();
+    }
+    const times = bar.runs > 1 ? `, runs ${bar.runs} times` : "";
+    title.textContent = `${bar.name}(), ${isOwn(bar) ? `line ${bar.site[0]}${times}` : "written in another file"}`;
+    rows.replaceChildren(...bar.slots.map((slot) => this.row(bar, slot, editor, timeUnit)));
+    if (bar.broken) rows.append(element("p", { className: "broken", textContent: bar.broken }));
+    if (isOwn(bar) && bar.more.length) rows.append(this.adder(bar, editor));
+    return null;
+  }
+
+  // Other values in the same fields; the one that is typed into stays.
+  refresh(bar) {
+    this.bar = bar;
+    for (const { name, value } of bar.slots) {
+      const input = this.box.querySelector(`[data-slot="${name}"]`);
+      if (input && input !== document.activeElement) input.value = value;
+    }
+  }
+
+  row(bar, slot, editor, timeUnit) {
+    this.bar = bar;
+    const row = element("label");
+    row.append(element("span", { textContent: readable(slot.name) }));
+    if (!slot.span) {
+      row.append(element("code", { textContent: slot.code, title: slot.why }), element("small", { textContent: "computed" }));
+      return row;
+    }
+    const words = typeof slot.value === "string" ? editor.words[slot.name] ?? [slot.value] : null;
+    const input = element(words ? "select" : "input");
+    if (words) input.append(...[...new Set([...words, slot.value])].map((word) => new Option(word)));
+    else Object.assign(input, { type: "number", step: stepOf(slot) });
+    input.value = slot.value;
+    input.dataset.slot = slot.name;
+    const value = () => (words ? input.value : input.valueAsNumber);
+    const send = (isCommitted) => {
+      clearTimeout(this.resting);
+      if (words || Number.isFinite(value())) this.studio.set(this.bar, slot.name, value(), isCommitted);
+    };
+    input.addEventListener("input", () => {
+      clearTimeout(this.resting);
+      if (!words) this.resting = setTimeout(() => send(false), DRAFT_REST);
+    });
+    input.addEventListener("change", () => send(true));
+    const note = slot.place ? `${unitOf(slot, timeUnit)} · ${slot.place}` : unitOf(slot, timeUnit);
+    row.append(input, element("small", { textContent: note, title: note }));
+    return row;
+  }
+
+  adder(bar, editor) {
+    const select = element("select", { className: "adder" });
+    select.setAttribute("aria-label", "Add an argument");
+    select.append(new Option("Add an argument…", ""), ...bar.more.map((name) => new Option(readable(name), name)));
+    select.addEventListener("change", () => {
+      const name = select.value;
+      if (name) this.studio.set(bar, name, firstValue(name, editor), true);
+    });
+    return select;
+  }
+}
+
+function shapeOf(bar) {
+  return JSON.stringify([bar.name, bar.site, bar.slots.map(({ name }) => name)]);
+}
+
+function stepOf({ name, is_angle: isAngle }) {
+  if (isAngle) return 1;
+  return LENGTHS.includes(name) ? 0.005 : 0.05;
+}
+
+function unitOf({ name, value, is_angle: isAngle }, timeUnit) {
+  if (isAngle) return "°";
+  if (LENGTHS.includes(name)) return "m";
+  if (["over", "seconds", "t", "shift_time", "flight"].includes(name)) return timeUnit;
+  if (["roll", "pitch", "yaw", "angle", "turn", "hip", "thigh", "calf"].includes(name)) return "rad";
+  return typeof value === "number" ? "" : "word";
+}
+
+// What an argument is at first when it is added; angles in degrees.
+function firstValue(name, editor) {
+  if (editor.words[name]) return editor.words[name][0];
+  if (["roll", "pitch", "yaw", "angle", "turn"].includes(name)) return 5;
+  return LENGTHS.includes(name) ? 0.02 : 0.5;
+}
