@@ -316,16 +316,21 @@ class Source:
         around = target if index is None else above[target]
         if isinstance(around, ast.Assign | ast.AnnAssign):
             value = around.value
-        elif isinstance(around, ast.For) and isinstance(around.iter, ast.Tuple | ast.List):
-            value = around.iter.elts[number % len(around.iter.elts)]
+        elif isinstance(around, ast.For) and (parts := self._parts(around.iter)):
+            value = parts[number % len(parts)]
         else:
             return None
-        if index is None:
+        if index is None or value is None:
             return value
-        if isinstance(value, ast.Name):
-            (value, *others) = [*self._bindings(self._tree, value.id, number), None]
-            value = None if others[1:] else value
-        return value.elts[index] if isinstance(value, ast.Tuple) else None
+        parts = self._parts(value)
+        return parts[index] if index < len(parts) else None
+
+    def _parts(self, node: ast.expr) -> list[ast.expr]:
+        """The elements of a tuple or list that is written out, or has a name; none of another."""
+        if isinstance(node, ast.Name):
+            found = list(self._bindings(self._tree, node.id, 0))
+            node = found[0] if len(found) == 1 and found[0] is not None else node
+        return node.elts if isinstance(node, ast.Tuple | ast.List) else []
 
     def _added(self, site: Site, name: str, value: float | str) -> Source:
         call = self._call(site)

@@ -1,0 +1,204 @@
+"""A studio from the side of its page: drafts, saves, what is refused, and a file that misbehaves."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from controller.studio import running
+from controller.studio.session import Studio
+from go2_wbc.errors import StudioError
+from tests.viz.page_reader import read_pack
+
+GREET = '''"""Greets."""
+
+from typing import Annotated
+
+from motions import Range, Timeline, deg, motion
+
+
+@motion
+def greet(times: Annotated[int, Range(1, 3)] = 1) -> Timeline:
+    """Greet."""
+    line = Timeline().body(pitch=deg(10.0), over=0.6).home(over=0.6)
+    for _ in range(times):
+        line = line.foot("FR", z=0.08, over=0.5).down("FR", over=0.5)
+    return line.home(over=0.6)
+'''
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("studio")
+
+
+@pytest.fixture(scope="module")
+def opened(folder: Path) -> Iterator[Studio]:
+    file = folder / "greet.py"
+    file.write_text(GREET, encoding="utf-8")
+    with Studio(file, None, 0) as studio:
+        yield studio
+
+
+@pytest.fixture
+def studio(opened: Studio, folder: Path) -> Studio:
+    """With the file as it was at first."""
+    (folder / "greet.py").write_text(GREET, encoding="utf-8")
+    opened.look()
+    return opened
+
+
+@pytest.fixture
+def file(folder: Path) -> Path:
+    return folder / "greet.py"
+
+
+def _shown(packed: str) -> dict[str, Any]:
+    header, _ = read_pack(gzip.decompress(base64.b64decode(packed)))
+    return header
+
+
+def _editor(studio: Studio) -> dict[str, Any]:
+    """What the page shows now."""
+    return _shown(studio._server.data)["editor"]
+
+
+def _edit(studio: Studio, bar: int, **order: object) -> dict[str, Any]:
+    editor = _editor(studio)
+    site = {"site": editor["bars"][bar]["site"], "base": editor["base"], "commit": True}
+    return json.loads(json.dumps(studio.edit({**site, **order})))
+
+
+def test_bars_are_the_calls_of_the_file(studio: Studio) -> None:
+    editor = _editor(studio)
+    assert studio.motion == "greet"
+    told = [(bar["name"], bar["parts"], bar["runs"], bar["broken"]) for bar in editor["bars"]]
+    assert told == [
+        ("body", ["trunk"], 1, ""),
+        ("home", ["trunk"], 1, ""),
+        ("foot", ["FR"], 1, ""),
+        ("down", ["FR"], 1, ""),
+        ("home", ["trunk"], 1, ""),
+    ]
+    assert (editor["file"], editor["undo"], editor["redo"]) == ("greet.py", editor["undo"], False)
+
+
+def test_a_draft_is_shown_and_not_saved(studio: Studio, file: Path) -> None:
+    before = _editor(studio)
+    answer = _edit(studio, 0, op="set", name="pitch", value=50.0, commit=False)
+    draft = _shown(answer["data"])
+    assert draft["editor"]["bars"][0]["broken"] != "", "the trunk would meet its legs"
+    assert not draft["verdict"]["ok"]
+    assert file.read_text(encoding="utf-8") == GREET
+    assert _editor(studio) == before
+
+
+def test_an_edit_is_saved_shown_and_undone(studio: Studio, file: Path) -> None:
+    assert _edit(studio, 0, op="set", name="over", value=0.9) == {}
+    assert file.read_text(encoding="utf-8") == GREET.replace("(10.0), over=0.6", "(10.0), over=0.9")
+    editor = _editor(studio)
+    assert editor["bars"][0]["span"][2] == pytest.approx(0.9)
+    assert editor["undo"]
+    assert studio.edit({"op": "undo"}) == {}
+    assert file.read_text(encoding="utf-8") == GREET
+    assert _editor(studio)["bars"][0]["span"][2] == pytest.approx(0.6)
+
+
+def test_what_the_language_refuses_is_not_written(studio: Studio, file: Path) -> None:
+    answer = _edit(studio, 2, op="delete")
+    assert "foot FR is not raised" in answer["error"]
+    assert "line 13" in answer["error"]
+    assert file.read_text(encoding="utf-8") == GREET
+
+
+def test_a_page_that_shows_an_older_text_changes_nothing(studio: Studio, file: Path) -> None:
+    old = _editor(studio)
+    theirs = GREET.replace("over=0.6)\n", "over=0.7)\n", 1)
+    file.write_text(theirs, encoding="utf-8")
+    order = {"op": "delete", "site": old["bars"][0]["site"], "base": old["base"], "commit": True}
+    assert "saved elsewhere" in str(studio.edit(order)["error"])
+    assert file.read_text(encoding="utf-8") == theirs
+    assert _editor(studio)["bars"][1]["span"][2] == pytest.approx(1.3), "theirs is shown"
+
+
+def test_a_text_that_somebody_breaks_is_told_and_can_be_undone(studio: Studio, file: Path) -> None:
+    file.write_text(GREET.replace("return line", "return lines"), encoding="utf-8")
+    assert studio.look()
+    assert "NameError" in str(studio._server._error)
+    assert studio.edit({"op": "undo"}) == {}
+    assert file.read_text(encoding="utf-8") == GREET
+    assert studio._server._error is None
+
+
+def test_a_file_that_is_away_is_told(studio: Studio, file: Path) -> None:
+    file.unlink()
+    assert not studio.look()
+    assert "cannot read greet.py" in str(studio._server._error)
+    assert "cannot read" in _edit(studio, 0, op="delete")["error"]
+    assert not file.exists()
+
+
+def test_a_chosen_parameter_is_no_edit(studio: Studio, file: Path) -> None:
+    studio._choose({"times": 2})
+    bars = _editor(studio)["bars"]
+    assert [bar["runs"] for bar in bars if bar["name"] == "foot"] == [2, 2]
+    assert file.read_text(encoding="utf-8") == GREET
+    studio._choose({})
+
+
+def test_a_motion_that_cannot_be_done_is_made_possible(studio: Studio, file: Path) -> None:
+    assert _edit(studio, 0, op="set", name="pitch", value=40.0) == {}
+    changes = studio.mend({})["changes"]
+    assert isinstance(changes, tuple)
+    call, _ = changes[0]
+    assert _edit(studio, 0, op="change", which=7)["error"]
+    assert _edit(studio, 0, op="change", which=0) == {}
+    assert f"return line.home(over=0.6){call}\n" in file.read_text(encoding="utf-8")
+    assert _shown(studio._server.data)["verdict"]["ok"]
+
+
+def test_physics_plays_it_beside_the_plan(studio: Studio) -> None:
+    answer = studio.play({})
+    shown = _shown(str(answer["data"]))
+    assert not shown["is_plan"]
+    assert shown["ghost"] is not None
+    assert str(answer["told"]).startswith("played in MuJoCo: done")
+
+
+@pytest.mark.slow
+def test_a_file_that_never_ends_is_stopped_and_the_next_one_runs(
+    studio: Studio, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(running, "LONGEST_RUN", 0.5)
+    endless = GREET.replace("    line = Time", "    while times: pass\n    line = Time")
+    file.write_text(endless, encoding="utf-8")
+    studio.look()
+    assert "ran for longer than 0.5 s; it was stopped" in str(studio._server._error)
+    for text, told in (
+        (GREET + "\nimport os\nos._exit(3)\n", "has ended the process"),
+        (GREET + "\nimport sys\nsys.exit(3)\n", "the file ends the program"),
+    ):
+        file.write_text(text, encoding="utf-8")
+        studio.look()
+        assert told in str(studio._server._error)
+    file.write_text(GREET, encoding="utf-8")
+    studio.look()
+    assert studio._server._error is None
+
+
+def test_a_file_without_a_motion_does_not_open(tmp_path: Path) -> None:
+    file = tmp_path / "none.py"
+    with pytest.raises(StudioError, match="cannot read none.py"):
+        Studio(file, None, 0)
+    file.write_text("x = 1\n", encoding="utf-8")
+    start = time.monotonic()
+    with pytest.raises(StudioError, match="defines no motion"):
+        Studio(file, None, 0)
+    assert time.monotonic() - start < running.LONGEST_WORK

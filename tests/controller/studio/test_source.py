@@ -1,0 +1,234 @@
+"""Edits of a file touch only their span; what cannot be edited says why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from controller.studio.edits import PALETTE, edited
+from controller.studio.source import Site, Slot, Source, written
+from go2_wbc.errors import StudioError
+from motions import find_motion, motion_names
+from motions.language.tracing import CallMark, separated, traced
+from motions.registry import load_text
+
+FILE = b'''"""Bows."""
+
+from motions import Timeline, deg, motion
+
+DEEP, HIGH = -0.03, 0.08  # m
+SIDES = ("FL", "FR")
+
+
+@motion
+def greet() -> Timeline:
+    """Greet."""
+    line = (
+        Timeline()
+        .body(pitch=deg(12.0), z=DEEP, over=0.80)  # the bow
+        # then rest
+        .hold(0.4)
+        .home(over=1)
+    )
+    for foot in SIDES:
+        line = line.foot(foot, z=HIGH, over=0.5).down(foot, over=0.5)
+    for yaw in (10.0, -10.0):
+        line = line.body(yaw=deg(yaw), over=0.3)
+    line = line.body(yaw=0.0, over=2 * 0.25)
+    return line.home(over=0.6)
+'''
+
+
+def _sites(data: bytes, name: str = "greet") -> list[tuple[CallMark, Site]]:
+    with traced():
+        marks = separated(load_text(Path("greet.py"), data)[name]())[1]
+    return [(mark, mark.call.site) for mark in marks]
+
+
+def _site(data: bytes, call: str, number: int = 0) -> Site:
+    return [site for mark, site in _sites(data) if mark.call.name == call][number]
+
+
+def _changed(before: bytes, after: bytes) -> list[tuple[bytes, bytes]]:
+    rows = zip(before.splitlines(keepends=True), after.splitlines(keepends=True), strict=True)
+    return [(old, new) for old, new in rows if old != new]
+
+
+def test_a_number_is_replaced_with_as_many_decimals() -> None:
+    source, site = Source(FILE), _site(FILE, "body")
+    ((old, new),) = _changed(FILE, source.set(site, "over", 0.9).data)
+    assert new == old.replace(b"over=0.80", b"over=0.90")
+    ((old, new),) = _changed(FILE, source.set(site, "pitch", 15.5).data)
+    assert new == old.replace(b"12.0", b"15.5")
+    ((_, new),) = _changed(FILE, source.set(site, "z", -0.045).data)
+    assert new == b"DEEP, HIGH = -0.045, 0.08  # m\n", "where the name gets its value"
+    ((_, new),) = _changed(FILE, source.set(_site(FILE, "home"), "over", 2).data)
+    assert new.strip() == b".home(over=2)"
+
+
+def test_slots_tell_values_units_and_places() -> None:
+    source = Source(FILE)
+    pitch, z, over = source.slots(_site(FILE, "body"))
+    assert (pitch.value, pitch.is_angle, z.value, z.place) == (12.0, True, -0.03, "DEEP, line 5")
+    assert (over.name, over.value, over.is_angle) == ("over", 0.8, False)
+    leg, *_ = source.slots(_site(FILE, "foot", 1), 1)
+    assert (leg.value, leg.place) == ("FR", "foot, line 6")
+    _, over = source.slots(_site(FILE, "body", 3))
+    assert (over.value, over.span, over.code) == (None, None, "2 * 0.25")
+    assert "computed" in over.why
+    (yaw, _), (other, _) = (source.slots(_site(FILE, "body", k + 1), k) for k in (0, 1))
+    assert (yaw.value, other.value) == (10.0, -10.0), "one element for each run of the loop"
+    ((_, new),) = _changed(FILE, source.set(_site(FILE, "body", 2), "yaw", -20.0, 1).data)
+    assert b"(10.0, -20.0)" in new
+
+
+def test_what_has_several_values_is_left_alone() -> None:
+    text = FILE.replace(b"DEEP, HIGH", b"DEEP = 1.0\nDEEP, HIGH")
+    site = _site(text, "body")
+    slot = next(slot for slot in Source(text).slots(site) if slot.name == "z")
+    assert slot.span is None
+    with pytest.raises(StudioError, match="z is DEEP: DEEP has more than one value"):
+        Source(text).set(site, "z", 0.1)
+
+
+def test_arguments_are_added_in_the_units_of_authors() -> None:
+    source, site = Source(FILE), _site(FILE, "body")
+    ((_, new),) = _changed(FILE, source.set(site, "yaw", 5.0).data)
+    assert b"over=0.80, yaw=deg(5.0))  # the bow" in new
+    bare = FILE.replace(b", deg,", b",").replace(b"deg(12.0)", b"0.2").replace(b"deg(yaw)", b"0.1")
+    ((_, new),) = _changed(bare, Source(bare).set(_site(bare, "body"), "yaw", 5.0).data)
+    assert b"over=0.80, yaw=0.0873)" in new, "deg is not known there"
+    with pytest.raises(StudioError, match="sideways"):
+        source.set(site, "sideways", 1.0)
+
+
+def test_a_call_is_deleted_and_comments_of_others_stay() -> None:
+    data = Source(FILE).delete(_site(FILE, "hold")).data
+    assert data == FILE.replace(b"        .hold(0.4)\n", b"")
+    data = Source(FILE).delete(_site(FILE, "body")).data
+    assert data == FILE.replace(
+        b"        .body(pitch=deg(12.0), z=DEEP, over=0.80)  # the bow\n", b""
+    )
+    data = Source(FILE).delete(_site(FILE, "body", 3)).data
+    assert data == FILE.replace(b"    line = line.body(yaw=0.0, over=2 * 0.25)\n", b"")
+    data = Source(FILE).delete(_site(FILE, "body", 1)).data
+    assert b"in (10.0, -10.0):\n        pass\n" in data, "a loop is not left empty"
+
+
+def test_a_call_is_made_again_moved_and_followed_by_another() -> None:
+    source = Source(FILE)
+    data = source.duplicate(_site(FILE, "hold")).data
+    assert data == FILE.replace(b"        .hold(0.4)\n", 2 * b"        .hold(0.4)\n")
+    data = source.swap(_site(FILE, "hold"), 1).data
+    assert b"        .home(over=1)\n        .hold(0.4)\n    )" in data
+    data = source.swap(_site(FILE, "hold"), -1).data
+    assert data.index(b".hold(0.4)") < data.index(b".body(pitch=deg(12.0), z=DEEP, over=0.80)  #")
+    data = source.insert(_site(FILE, "body"), ".hold(1.0)").data
+    assert b"# the bow\n        .hold(1.0)\n        # then rest\n        .hold(0.4)" in data
+    data = source.insert(_site(FILE, "foot"), ".hold(1.0)").data
+    assert b"over=0.5).hold(1.0).down(foot" in data
+    with pytest.raises(StudioError, match="first call of its chain"):
+        source.swap(_site(FILE, "foot"), -1)
+
+
+def test_a_change_is_appended_to_what_is_returned() -> None:
+    data = Source(FILE).append("greet", ".scale(0.9)").data
+    assert data == FILE.replace(b"line.home(over=0.6)\n", b"line.home(over=0.6).scale(0.9)\n")
+    twice = FILE.replace(b"    line = (", b"    if False:\n        return Timeline()\n    line = (")
+    with pytest.raises(StudioError, match="returns in 2 places"):
+        Source(twice).append("greet", ".scale(0.9)")
+
+
+@pytest.mark.parametrize(
+    "layout",
+    [
+        lambda data: data.replace(b"\n", b"\r\n"),
+        lambda data: b"\xef\xbb\xbf" + data,
+        lambda data: data.replace(b"    ", b"\t"),
+        lambda data: data.replace("the bow".encode(), "der Bückling ".encode()),
+        lambda data: data.replace(b"Timeline()\n", b"Timeline() \\\n"),
+        lambda data: data.replace(b"(\n        Timeline()", b"((\n        Timeline())  # )"),
+    ],
+    ids=["CRLF", "byte order mark", "tabs", "umlaut", "backslash", "brackets"],
+)
+def test_layouts_stay(layout: object) -> None:
+    assert callable(layout)
+    data: bytes = layout(FILE)
+    for mark, site in _sites(data):
+        for slot in Source(data).slots(site, mark.call.number):
+            if isinstance(slot.value, float):
+                after = Source(data).set(site, slot.name, slot.value + 0.25, mark.call.number).data
+                assert len(_changed(data, after)) == 1
+    site = _site(data, "hold")
+    again = Source(Source(data).duplicate(site).data).delete(site).data
+    assert again == data
+
+
+def test_what_is_no_python_says_the_line() -> None:
+    with pytest.raises(StudioError, match="line 10"):
+        Source(FILE.replace(b"def greet()", b"def greet("))
+    with pytest.raises(StudioError, match="the file has changed"):
+        Source(FILE).slots((2, 0))
+
+
+@pytest.mark.parametrize(
+    ("value", "before", "text"),
+    [(0.30000001, "0.25", "0.30"), (2, "1", "2"), (1.5, "1", "1.5"), (-0.0, "0.5", "0.0")],
+)
+def test_numbers_are_written_as_people_do(value: float, before: str, text: str) -> None:
+    assert written(value, before) == text
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        {"op": "insert", "site": [14, 49], "title": '__import__("os")'},
+        {"op": "set", "site": [14, 49], "name": "over", "value": '0.1); import os; ("'},
+        {"op": "set", "site": [14, 49], "name": "x=exec('1')", "value": 1.0},
+        {"op": "set", "site": [14, 49], "name": "over", "value": True},
+        {"op": "exec", "site": [14, 49]},
+        {"op": "delete", "site": "all"},
+    ],
+)
+def test_no_code_comes_from_a_page(order: dict[str, object]) -> None:
+    with pytest.raises(StudioError):
+        edited(Source(FILE), order)
+
+
+def test_every_move_of_the_palette_is_a_call_of_the_language() -> None:
+    for title, template in PALETTE.items():
+        after = edited(Source(FILE), {"op": "insert", "site": [16, 18], "title": title}).data
+        assert template.code(Source(FILE)).encode() in after
+
+
+def _library() -> Iterator[tuple[bytes, CallMark, list[Slot]]]:
+    for name in motion_names():
+        file = Path(find_motion(name).source.rpartition(":")[0]).resolve()
+        data = file.read_bytes()
+        with traced():
+            marks = separated(load_text(file, data)[name]())[1]
+        source = Source(data)
+        for mark in marks:
+            if mark.call.file == str(file):
+                yield data, mark, source.slots(mark.call.site, mark.call.number)
+
+
+def test_the_library_can_be_edited_one_line_at_a_time() -> None:
+    bars = editable = 0
+    done = set[tuple[bytes, Site]]()
+    for data, mark, slots in _library():
+        bars, editable = bars + 1, editable + all(slot.span is not None for slot in slots)
+        assert all(slot.why for slot in slots if slot.span is None)
+        if (data, mark.call.site) in done:
+            continue
+        done.add((data, mark.call.site))
+        for slot in slots:
+            if isinstance(slot.value, float):
+                site, number = mark.call.site, mark.call.number
+                source = Source(data)
+                assert source.set(site, slot.name, slot.value, number).data == data
+                assert len(_changed(data, source.set(site, slot.name, 0.123, number).data)) == 1
+    assert bars > 500
+    assert editable / bars > 0.8
