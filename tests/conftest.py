@@ -32,6 +32,7 @@ LONGEST = tuple(
         "test_docs.py",
         "viz/replay/test_plan_browser.py",
         "viz/replay/test_live_browser.py",
+        "viz/replay/test_studio_browser.py",
         "viz/replay/test_browser.py",
         "controller/cli/test_demo.py",
         "scenarios/test_always_an_answer.py",

@@ -1,4 +1,4 @@
-"""Runs ``go2-wbc preview`` as a user does, in a process of its own, and reads what it says."""
+"""Runs ``go2-wbc preview`` or ``studio`` as a user does, and reads what it says."""
 
 from __future__ import annotations
 
@@ -42,10 +42,11 @@ class LivePreview:
         url: of the page.
     """
 
-    def __init__(self, *arguments: str) -> None:
-        command = [sys.executable, "-m", "controller.cli.main", "preview", *arguments]
+    def __init__(self, *arguments: str, command: str = "preview", folder: Path = ROOT) -> None:
+        program = [sys.executable, "-m", "controller.cli.main", command, *arguments]
         self._process = subprocess.Popen(
-            [*command, "--json", "--no-open", "--port", "0"],
+            [*program, "--json", "--no-open", "--port", "0"],
+            cwd=folder,
             stdout=subprocess.PIPE,
             text=True,
             env={**os.environ, "PYTHONPATH": str(ROOT)},

@@ -17,7 +17,7 @@ from go2_wbc.recording import Recording
 from tests.viz.page_reader import packed_parts, read_data, read_pack
 from tests.viz.verdicts import made_up_verdict
 from viz.content import ReplayContent
-from viz.replay.preview_server import PreviewServer
+from viz.replay.preview_server import TOKEN_HEADER, PreviewServer
 
 
 @pytest.fixture
@@ -123,6 +123,40 @@ def test_nothing_else_can_be_sent(server: PreviewServer, recording: Recording) -
     assert _ask(server, "PUT /data", b"x")[0] == 501
     with PreviewServer(ReplayContent(recording), "t", 0) as without_parameters:
         assert _post(without_parameters, "/parameters", b"{}") == 404
+
+
+@pytest.fixture
+def editor(recording: Recording) -> Iterator[PreviewServer]:
+    """A server of a page that may edit."""
+    actions = {"/edit": lambda order: {"heard": order}}
+    with PreviewServer(ReplayContent(recording), "t", 0, token="secret", actions=actions) as opened:  # noqa: S106
+        yield opened
+
+
+@pytest.mark.parametrize("path", ["/", "/data", "/events"])
+@pytest.mark.parametrize("query", ["", "?token=", "?token=secre", "?token=secret2", "?secret"])
+def test_without_the_token_nothing_is_told(editor: PreviewServer, path: str, query: str) -> None:
+    status, told = _ask(editor, f"GET {path}{query}")
+    assert (status, told) == (403, "open the address that the terminal shows\n")
+
+
+def test_with_the_token_orders_are_answered(editor: PreviewServer) -> None:
+    assert _ask(editor, "GET /data?token=secret")[0] == 200
+    assert "class Studio" in _ask(editor, "GET /?token=secret")[1]
+    own = {"Origin": f"http://127.0.0.1:{_port(editor)}"}
+    order = b'{"op": "undo"}'
+    answer = _ask(editor, "POST /edit?token=secret", order, own)
+    assert answer == (200, '{"heard": {"op": "undo"}}')
+    assert _ask(editor, "POST /edit", order, {**own, TOKEN_HEADER: "secret"})[0] == 200
+    assert _ask(editor, "POST /edit", order, own)[0] == 403
+    assert _ask(editor, "POST /edit?token=secret", order)[0] == 403, "no page"
+    for body in (b"[1]", b"1", b"{", b" " * 5000):
+        assert _ask(editor, "POST /edit?token=secret", body, own)[0] == 400
+
+
+def test_a_preview_edits_nothing(server: PreviewServer) -> None:
+    assert _post(server, "/edit", b"{}") == 404
+    assert "class Studio" not in _ask(server, "GET /")[1]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere 127.0.0.2 is no address")

@@ -1,0 +1,145 @@
+"""``go2-wbc studio`` as a user sees it: bars are dragged, and the file says what the page shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tests.controller.studio.test_session import GREET
+from tests.live_preview import LivePreview
+from tests.viz.replay.browsing import Tab
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+pytestmark = pytest.mark.slow
+SAID = "document.getElementById('studio-say').textContent"
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("studio") / "greet.py"
+    path.write_text(GREET, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def studio(file: Path, chromium_browser: Browser) -> Iterator[Tab]:
+    with LivePreview(str(file), command="studio") as opened, Tab(chromium_browser) as tab:
+        tab.open(opened.url)
+        tab.wait_for("window.studio && replay.version")
+        yield tab
+        assert tab.complaints == []
+        assert all(url.startswith(opened.url.partition("?")[0]) for url in tab.requested)
+
+
+@pytest.fixture
+def tab(studio: Tab, file: Path) -> Iterator[Tab]:
+    """The page, its file as it was at first; undone, it is so again."""
+    yield studio
+    while studio.evaluate("studio.editor.undo"):
+        _do(studio, "studio.act('undo')")
+    assert file.read_text(encoding="utf-8") == GREET
+
+
+def _do(tab: Tab, gesture: str) -> None:
+    tab.evaluate(gesture)
+    _settle(tab)
+
+
+def _settle(tab: Tab) -> None:
+    tab.wait_for("!studio.isBusy && !studio.waiting")
+
+
+def _bar(tab: Tab, index: int) -> dict[str, Any]:
+    return tab.page.locator(f"[data-bar='{index}']").bounding_box() or {}
+
+
+def test_an_edge_is_dragged(tab: Tab, file: Path) -> None:
+    box, mouse = _bar(tab, 0), tab.page.mouse
+    right, middle = box["x"] + box["width"], box["y"] + box["height"] / 2
+    second = box["width"] / 0.6
+    mouse.move(right - 3, middle)
+    mouse.down()
+    mouse.move(right - 3 + 0.2 * second, middle, steps=3)
+    tab.wait_for(f"{SAID} === 'not saved yet' && Math.abs(replay.data.duration - 3.5) > 0.1")
+    assert file.read_text(encoding="utf-8") == GREET, "a draft is not saved"
+    mouse.move(right - 3 + 0.3 * second, middle, steps=2)
+    mouse.up()
+    tab.wait_for(f"{SAID} === 'saved'")
+    _settle(tab)
+    assert file.read_text(encoding="utf-8") == GREET.replace("(10.0), over=0.6", "(10.0), over=0.9")
+    assert _bar(tab, 1)["x"] > right + 0.2 * second, "what follows comes later"
+
+
+def test_a_number_is_typed_and_a_broken_limit_is_red(tab: Tab, file: Path) -> None:
+    tab.page.locator("[data-bar='0']").click()
+    field = tab.page.locator("[data-slot=pitch]")
+    assert field.input_value() == "10"
+    field.fill("45")
+    field.press("Enter")
+    tab.wait_for("document.querySelector('[data-bar=\"0\"]').classList.contains('broken')")
+    _settle(tab)
+    assert "pitch=deg(45.0)" in file.read_text(encoding="utf-8")
+    assert "broken" in tab.text("#badge")
+    assert tab.evaluate("replay.time") == pytest.approx(0.6), "the pose it leads to is shown"
+    tab.page.locator("[data-ask=mend]").click()
+    tab.wait_for("document.querySelectorAll('#studio-changes button').length > 0")
+    tab.click("#studio-changes button")
+    tab.wait_for("document.getElementById('badge').textContent.startsWith('feasible')")
+    _settle(tab)
+
+
+def test_keys_reach_every_bar(tab: Tab, file: Path) -> None:
+    keys = tab.page.keyboard
+    tab.page.locator("[data-bar='0']").focus()
+    keys.press("ArrowRight")
+    assert tab.evaluate("document.activeElement.dataset.bar") == "1"
+    for press, changed in (
+        ("Shift+ArrowRight", GREET.replace("home(over=0.6)\n    for", "home(over=0.65)\n    for")),
+        ("d", GREET.replace(".home(over=0.6)\n    for", 2 * ".home(over=0.6)" + "\n    for")),
+        ("Delete", GREET.replace(".home(over=0.6)\n    for", "\n    for")),
+    ):
+        tab.page.locator("[data-bar='1']").focus()
+        keys.press(press)
+        _settle(tab)
+        assert file.read_text(encoding="utf-8") == changed
+        keys.press("Control+z")
+        _settle(tab)
+        assert file.read_text(encoding="utf-8") == GREET
+
+
+def test_a_move_is_inserted_and_one_that_is_refused_is_told(tab: Tab, file: Path) -> None:
+    tab.page.locator("[data-bar='0']").click()
+    tab.page.get_by_label("Insert a move").select_option("Pause")
+    tab.wait_for(f"{SAID} === 'saved'")
+    _settle(tab)
+    assert "(10.0), over=0.6).hold(seconds=0.5).home" in file.read_text(encoding="utf-8")
+    before = file.read_text(encoding="utf-8")
+    tab.page.locator("[data-bar='3']").click()
+    tab.click("[data-op=delete]")
+    tab.wait_for(f"{SAID}.includes('foot FR is not raised')")
+    _settle(tab)
+    assert file.read_text(encoding="utf-8") == before
+
+
+def test_what_an_editor_saves_appears(tab: Tab, file: Path) -> None:
+    file.write_text(GREET.replace("over=0.6)\n", "over=1.6)\n", 1), encoding="utf-8")
+    tab.wait_for("Math.abs(studio.editor.bars[1].span[2] - 2.2) < 0.01")
+
+
+def test_physics_is_shown_beside_the_plan(tab: Tab) -> None:
+    tab.click("[data-ask=play]")
+    tab.wait_for(f"{SAID}.startsWith('played in MuJoCo: done')")
+    assert tab.evaluate("replay.data.ghost !== null && !replay.data.header.is_plan")
+    tab.evaluate("replay.play(false)")
+
+
+def test_nothing_is_wider_than_the_screen(tab: Tab) -> None:
+    for width, height in ((390, 844), (844, 390), (1280, 720)):
+        tab.resize(width, height)
+        assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth"), width
+        assert tab.evaluate("document.getElementById('bars').clientHeight > 40"), width
