@@ -1,4 +1,4 @@
-"""A studio from the side of its page: drafts, saves, what is refused, and a file that misbehaves."""
+"""A studio as its page sees it: drafts, saves, what is refused, and a file that misbehaves."""
 
 from __future__ import annotations
 
@@ -195,7 +195,7 @@ def test_a_file_that_never_ends_is_stopped_and_the_next_one_runs(
 
 def test_a_file_without_a_motion_does_not_open(tmp_path: Path) -> None:
     file = tmp_path / "none.py"
-    with pytest.raises(StudioError, match="cannot read none.py"):
+    with pytest.raises(StudioError, match=r"cannot read none\.py"):
         Studio(file, None, 0)
     file.write_text("x = 1\n", encoding="utf-8")
     start = time.monotonic()

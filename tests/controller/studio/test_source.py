@@ -147,7 +147,7 @@ def test_a_change_is_appended_to_what_is_returned() -> None:
         lambda data: data.replace(b"\n", b"\r\n"),
         lambda data: b"\xef\xbb\xbf" + data,
         lambda data: data.replace(b"    ", b"\t"),
-        lambda data: data.replace("the bow".encode(), "der Bückling ".encode()),
+        lambda data: data.replace(b"the bow", "der Bückling ".encode()),
         lambda data: data.replace(b"Timeline()\n", b"Timeline() \\\n"),
         lambda data: data.replace(b"(\n        Timeline()", b"((\n        Timeline())  # )"),
     ],

@@ -65,8 +65,9 @@ def test_the_ground_that_was_seen_is_in_the_page(recording: Recording, tmp_path:
 
 def test_the_page_has_every_element_and_style_that_its_scripts_name(page: str) -> None:
     assets = resources.files("viz.replay") / "assets"
-    names = [file.name for file in assets.iterdir() if file.name.endswith(".js")]
-    scripts = "".join((assets / name).read_text(encoding="utf-8") for name in names)
+    files = [file for file in assets.iterdir() if file.name.endswith(".js")]
+    scripts = "".join(file.read_text(encoding="utf-8") for file in files)
+    page += (assets / "studio.css").read_text(encoding="utf-8")
     wanted = re.findall(r"getElementById\(\"([\w-]+)\"\)", scripts)
     assert len(wanted) > 10
     assert set(wanted) <= set(re.findall(r"\bid=\"([\w-]+)\"", page))

@@ -129,7 +129,7 @@ def test_nothing_else_can_be_sent(server: PreviewServer, recording: Recording) -
 def editor(recording: Recording) -> Iterator[PreviewServer]:
     """A server of a page that may edit."""
     actions = {"/edit": lambda order: {"heard": order}}
-    with PreviewServer(ReplayContent(recording), "t", 0, token="secret", actions=actions) as opened:  # noqa: S106
+    with PreviewServer(ReplayContent(recording), "t", 0, token="secret", actions=actions) as opened:
         yield opened
 
 

@@ -1,0 +1,52 @@
+"""``go2-wbc studio``: which file it edits, and what it never writes over."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from controller.cli.common import ExitCode
+from controller.cli.studio import _file_of
+from motions import load_file
+from tests.controller.cli.conftest import Run
+from tests.live_preview import LivePreview
+
+
+def test_a_file_is_begun_and_an_old_one_is_not_touched(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path, name = _file_of("greet.py")
+    assert (path, name) == (Path("greet.py"), None)
+    assert list(load_file(path)) == ["greet"]
+    path.write_text("mine", encoding="utf-8")
+    assert _file_of("greet.py:bow") == (Path("greet.py"), "bow")
+    assert path.read_text(encoding="utf-8") == "mine"
+
+
+def test_a_motion_of_the_library_is_copied_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Run
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path, name = _file_of("wave")
+    assert (path, name) == (Path("wave.py"), "wave")
+    assert "wave" in load_file(path)
+    told = run("studio", "wave", "--no-open", code=ExitCode.USAGE).err
+    assert "wave.py exists already: go2-wbc studio wave.py" in told
+    assert "'wavy'" in run("studio", "wavy", "--no-open", code=ExitCode.USAGE).err
+
+
+def test_a_file_that_is_no_motion_is_told(tmp_path: Path, run: Run) -> None:
+    file = tmp_path / "greet.py"
+    file.write_text("def greet(:\n", encoding="utf-8")
+    told = run("studio", file, "--no-open", "--port", 0, code=ExitCode.RUNTIME).err
+    assert "greet.py, line 1: SyntaxError" in told
+
+
+@pytest.mark.slow
+def test_it_serves_until_ctrl_c(tmp_path: Path) -> None:
+    with LivePreview(command="studio", folder=tmp_path) as studio:
+        assert "/?token=" in studio.url
+        assert (tmp_path / "my_motion.py").exists()
+        assert studio.interrupt() == ExitCode.OK
