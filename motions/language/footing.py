@@ -34,6 +34,30 @@ class Ground:
         return Ground(self.p_feet[rows], self.frames[rows], self.headings[rows])
 
 
+class _Way:
+    """Where one foot has come after 0, 1, 2 ... of its steps, so that few are looked at."""
+
+    def __init__(
+        self, start: Float[np.ndarray, "3"], steps: list[tuple[StepKey, Float[np.ndarray, "3"]]]
+    ) -> None:
+        self.places, self.moves, self.sums = [start], list[np.ndarray](), [start[:2]]
+        last = start
+        for _, goal in steps:
+            self.moves.append(goal[:2] - last[:2])
+            self.sums.append(self.sums[-1] + self.moves[-1])
+            self.places.append(self.places[-1] + (goal - self.places[-1]))
+            last = goal
+        spans = [(key.start, key.end, key.lead) for key, _ in steps]
+        self._begin, self._end, self._lead = np.array(spans).reshape(-1, 3).T
+
+    def during(self, times: Times, *, with_lead: bool) -> tuple[int, int]:
+        """Which steps are under way at increasing ``times``: the first, and the first after it."""
+        lead = self._lead if with_lead else 0.0
+        is_over = self._end + lead + SAME < times[0] if len(times) else np.zeros(0, dtype=bool)
+        has_begun = self._begin - lead <= times[-1] if len(times) else is_over
+        return int(np.logical_and.accumulate(is_over).sum()), int(has_begun.sum())
+
+
 class Footing:
     """The places of the feet of a timeline, in the frame of the motion.
 
@@ -71,6 +95,7 @@ class Footing:
         for leg, steps in self._steps.items():
             if steps:
                 _require_on_ground(timeline, leg)
+        self._ways = {leg: _Way(self.start[leg], steps) for leg, steps in self._steps.items()}
 
     def at(self, times: Times) -> Ground:
         """Where the feet are at increasing ``times``, and the frame from which the trunk counts."""
@@ -80,15 +105,16 @@ class Footing:
         return Ground(p_feet, frames, attitudes(turns))
 
     def place(self, leg: Leg, times: Times) -> Float[np.ndarray, "n 3"]:
-        """The centre [m] of one foot."""
-        p_foot = np.tile(self.start[leg], (len(times), 1))
-        for key, goal in self._steps[leg]:
-            after = times >= key.start
-            u = _shares(key, times[after], 0.0)
-            here = p_foot[after]
+        """The centre [m] of one foot at increasing ``times``."""
+        way = self._ways[leg]
+        first, last = way.during(times, with_lead=False)
+        p_foot = np.tile(way.places[first], (len(times), 1))
+        for key, goal in self._steps[leg][first:last]:
+            begin, end = _rows(key, times, 0.0)
+            u, here = _shares(key, times[begin:end], 0.0), p_foot[begin:end]
             here += _minimum_jerk(u)[:, None] * (goal - here)
             here[:, 2] += key.height * _ROUND * (u * (1.0 - u)) ** 3
-            p_foot[after] = here
+            p_foot[end:] += goal - p_foot[end:]
         return p_foot
 
     def frames(self, times: Times) -> Float[np.ndarray, "n 3"]:
@@ -96,13 +122,15 @@ class Footing:
 
         Every step moves it by minimum jerk; the yaw is continuous over increasing ``times``.
         """
-        p_feet = np.tile(self.start[:, :2], (len(times), 1, 1))
-        for leg, steps in self._steps.items():
-            last = self.start[leg, :2]
-            for key, goal in steps:
-                share = _minimum_jerk(_shares(key, times, key.lead))
-                p_feet[:, leg] += share[:, None] * (goal[:2] - last)
-                last = goal[:2]
+        p_feet = np.empty((len(times), 4, 2))
+        for leg, way in self._ways.items():
+            first, last = way.during(times, with_lead=True)
+            p_feet[:, leg] = way.sums[first]
+            for number, (key, _) in enumerate(self._steps[leg][first:last], first):
+                begin, end = _rows(key, times, key.lead)
+                share = _minimum_jerk(_shares(key, times[begin:end], key.lead))
+                p_feet[begin:end, leg] += share[:, None] * way.moves[number]
+                p_feet[end:, leg] += way.moves[number]
         ahead = p_feet[:, :2].mean(axis=1) - p_feet[:, 2:].mean(axis=1)
         yaw = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
         return np.column_stack([p_feet.mean(axis=1), yaw])
@@ -186,6 +214,12 @@ def _require_on_ground(timeline: TimelineData, leg: Leg) -> None:
                 f"foot {leg.name} is raised when it shall step at {key.start:.2f} s: put it down "
                 "before"
             )
+
+
+def _rows(key: StepKey, times: Times, lead: float) -> tuple[int, int]:
+    """The first of increasing ``times`` at which a step is under way, and the first after it."""
+    begin, end = np.searchsorted(times, (key.start - lead, key.end + lead + SAME)).tolist()
+    return begin, end
 
 
 def _shares(key: StepKey, times: Times, lead: float) -> Times:

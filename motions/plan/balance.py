@@ -26,10 +26,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy.interpolate import BSpline, CubicSpline
-from scipy.sparse import block_diag, csr_matrix, diags, eye, hstack, vstack
-from scipy.sparse.linalg import spsolve
+from scipy.linalg import solveh_banded
 
 from go2_wbc.errors import IkError
 from go2_wbc.geometry import convex_hull
@@ -201,7 +200,8 @@ class SwayProblem:
     """What to add to the place of the CoM in a stretch; its ``bias`` may change.
 
     The sway x keeps zero-moment point and CoM inside where G x <= h, one row for an edge at an
-    instant; first those of the zero-moment point.
+    instant; first those of the zero-moment point. A row has 8 numbers that are not 0, those of the
+    4 coefficients of x and y that count at its instant, by turns; so all matrices are bands.
     """
 
     def __init__(self, stepping: Stepping) -> None:
@@ -209,88 +209,110 @@ class SwayProblem:
 
         The CoM's edges count where more than two feet stand.
         """
-        values, curvature, jerk = _spline(stepping)
-        self._values, self._period = values, float(np.mean(np.diff(stepping.times)))
-        if not values.nnz:
-            return
-        zmp = csr_matrix(values - diags(stepping.lever) @ curvature)
+        spline = _Spline(stepping)
+        self._spline, self._period = spline, float(np.mean(np.diff(stepping.times)))
+        zmp = spline.values - stepping.lever[:, None] * spline.curvature
         normals, bounds = _edges(stepping)
         edges, rows = np.nonzero(np.isfinite(bounds).T)  # edge after edge
         own = np.flatnonzero((stepping.stance.sum(axis=1) > 2)[rows])
         place = np.concatenate([np.arange(len(rows)), own])
-        n = normals[rows, edges]
-        parts = [
-            hstack([diags(n[kept, 0]) @ part, diags(n[kept, 1]) @ part])
-            for kept, part in ((slice(None), zmp[rows]), (own, values[rows[own]]))
-        ]
-        self._G = csr_matrix(vstack(parts))
         self._rows, self._of_com = rows[place], len(rows)
-        self._normals, self._bounds = n[place], bounds[rows, edges][place]
-        own_cost = self._period * (values.T @ values) + SMOOTHING**6 * (jerk.T @ jerk)
-        self._H = csr_matrix(block_diag([own_cost, own_cost]))
+        self._normals, self._bounds = normals[rows, edges][place], bounds[rows, edges][place]
+        along = np.vstack([zmp[rows], spline.values[rows[own]]])
+        self._G = (along[:, :, None] * self._normals[:, None, :]).reshape(-1, 8)
+        own_cost = self._period * _gram(spline.first, spline.values, spline.count)
+        ones = np.arange(spline.count - 3)
+        own_cost += SMOOTHING**6 * _gram(ones, np.tile(spline.jerk, (len(ones), 1)), spline.count)
+        self._H = np.zeros((8, 2 * spline.count))
+        self._H[::2] = np.repeat(own_cost, 2, axis=1)
 
     def solve(self, stepping: Stepping) -> Float[np.ndarray, "n 2"]:
         """The way [m] in the same stretch with its bias; nothing, at rest, at both ends."""
-        if not self._values.nnz:
+        spline = self._spline
+        if spline.count <= 2 * FIXED:
             return np.zeros((len(stepping.times), 2))
         first, rest = self._rows[: self._of_com], self._rows[self._of_com :]
         points = np.concatenate([stepping.zmp()[first], stepping.p_com[rest, :2]])
         h = self._bounds - (self._normals * points).sum(axis=1)
-        ways = _least(self._H, self._G, h, STIFFNESS * self._period).reshape(2, -1)
-        return np.column_stack([self._values @ ways[0], self._values @ ways[1]])
+        x = self._least(h, STIFFNESS * self._period).reshape(-1, 2)
+        counted = x[spline.first[:, None] + np.arange(4)]  # n, 4, 2
+        return (spline.values[:, :, None] * counted).sum(axis=1)
+
+    def _least(self, h: Float[np.ndarray, " k"], stiffness: float) -> Float[np.ndarray, " m"]:
+        """The x of least f(x) = x' H x + s |max(0, G x - h)|^2.
+
+        Newton's steps, halved until f falls; they end where they would gain nothing.
+        """
+        H, G, first = self._H, self._G, 2 * self._spline.first[self._rows]
+        columns, free = first[:, None] + np.arange(8), slice(2 * FIXED, -2 * FIXED)
+        x = np.zeros(H.shape[1])
+
+        def left(x: Float[np.ndarray, " m"]) -> Float[np.ndarray, " k"]:
+            return (G * x[columns]).sum(axis=1) - h
+
+        def f(x: Float[np.ndarray, " m"], beyond: Float[np.ndarray, " k"]) -> float:
+            own = x @ (H[0] * x) + 2.0 * sum(x[d:] @ (H[d, :-d] * x[:-d]) for d in (2, 4, 6))
+            beyond = np.maximum(beyond, 0.0)
+            return float(own + stiffness * beyond @ beyond)
+
+        now = left(x)
+        for _ in range(MOST_STEPS):
+            active, wanted = now > 0.0, (1.0 - GAIN) * f(x, now)
+            rows, place = G[active], first[active]
+            band = H + stiffness * _gram(place, rows, len(x))
+            force = np.zeros_like(x)
+            np.add.at(force, columns[active], rows * h[active, None])
+            way = -x
+            way[free] += solveh_banded(band[:, free], stiffness * force[free], lower=True)
+            tried = ((p, left(p)) for p in (x + share * way for share in HALVES))
+            better = next(((p, one) for p, one in tried if f(p, one) < wanted), None)
+            if better is None:
+                break
+            x, now = better
+        return x
 
 
-def _least(
-    H: csr_matrix, G: csr_matrix, h: Float[np.ndarray, " k"], stiffness: float
-) -> Float[np.ndarray, " m"]:
-    """The x of least f(x) = x' H x + s |max(0, G x - h)|^2.
+FIXED = 3  #: Coefficients at either end that are 0: there the sway is nothing, at rest
 
-    Newton's steps, halved until f falls; they end where they would gain nothing.
+
+class _Spline:
+    """A uniform cubic spline over the times of a stretch: what its coefficients count for.
+
+    At each of the n times 4 coefficients do, from ``first`` on (of ``count``): for the value, and
+    the second derivative; and 4 for the jerk of a piece, scaled by the root of its length, so that
+    squares sum to an integral.
     """
 
-    def f(x: Float[np.ndarray, " m"]) -> float:
-        beyond = np.maximum(G @ x - h, 0.0)
-        return float(x @ (H @ x) + stiffness * beyond @ beyond)
+    def __init__(self, stepping: Stepping) -> None:
+        times = stepping.times
+        is_change = (stepping.stance[1:] != stepping.stance[:-1]).any(axis=1)
+        spans = np.diff(times[1:][is_change])
+        shortest = float(spans.min()) if len(spans) else LONGEST * KNOTS
+        wanted = min(max(shortest / KNOTS, SHORTEST), LONGEST)
+        pieces = max(round((times[-1] - times[0]) / wanted), 1)
+        length = (times[-1] - times[0]) / pieces
+        knots = times[0] + length * np.arange(-3, pieces + 4)
+        inside = np.clip(times, knots[3], knots[-4])
+        table = BSpline.design_matrix(inside, knots, 3)
+        self.count = pieces + 3
+        self.first = table.indices.reshape(-1, 4)[:, 0].astype(np.int64)
+        self.values = table.data.reshape(-1, 4)
+        u = (inside - knots[3 + self.first]) / length
+        # Second differences over length^2, linear in between.
+        self.curvature = np.column_stack([1.0 - u, 3.0 * u - 2.0, 1.0 - 3.0 * u, u]) / length**2
+        self.jerk = np.array([-1.0, 3.0, -3.0, 1.0]) / length**2.5
 
-    x = np.zeros_like(H.diagonal())
-    for _ in range(MOST_STEPS):
-        active = G @ x > h
-        part, wanted = G[active], (1.0 - GAIN) * f(x)
-        way = spsolve((H + stiffness * part.T @ part).tocsc(), stiffness * part.T @ h[active]) - x
-        better = next((p for p in (x + share * way for share in HALVES) if f(p) < wanted), None)
-        if better is None:
-            break
-        x = better
-    return x
 
-
-def _spline(stepping: Stepping) -> tuple[csr_matrix, csr_matrix, csr_matrix]:
-    """From the coefficients to values and second derivatives at the times, and to the jerks.
-
-    On uniform knots, h apart, a derivative of a spline has the differences of its coefficients over
-    h as its own. The jerks (one a piece) are scaled by sqrt(h), so that their squares sum to an
-    integral. The three outermost coefficients on either side are 0 and left out.
-    """
-    times = stepping.times
-    is_change = (stepping.stance[1:] != stepping.stance[:-1]).any(axis=1)
-    spans = np.diff(times[1:][is_change])
-    shortest = float(spans.min()) if len(spans) else LONGEST * KNOTS
-    wanted = min(max(shortest / KNOTS, SHORTEST), LONGEST)
-    pieces = max(round((times[-1] - times[0]) / wanted), 1)
-    length = (times[-1] - times[0]) / pieces
-    knots = times[0] + length * np.arange(-3, pieces + 4)
-    inside = np.clip(times, knots[3], knots[-4])
-    count = pieces + 3
-    differences = [
-        (eye(n - 1, n, k=1) - eye(n - 1, n)) / length for n in (count, count - 1, count - 2)
-    ]
-    second = differences[1] @ differences[0]
-    values = BSpline.design_matrix(inside, knots, 3)
-    curvature = BSpline.design_matrix(inside, knots[2:-2], 1) @ second
-    jerk = np.sqrt(length) * differences[2] @ second
-    free = slice(3, max(count - 3, 3))
-    first, second, third = (csr_matrix(table)[:, free] for table in (values, curvature, jerk))
-    return first, second, third
+def _gram(
+    first: Int[np.ndarray, " k"], rows: Float[np.ndarray, "k w"], size: int
+) -> Float[np.ndarray, "w size"]:
+    """R' R as a lower band, of a matrix R with the numbers ``rows`` from columns ``first`` on."""
+    width = rows.shape[1]
+    band = np.zeros((width, size))
+    for i in range(width):
+        for j in range(i + 1):
+            band[i - j] += np.bincount(first + j, rows[:, i] * rows[:, j], size)
+    return band
 
 
 def _edges(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -153,9 +153,8 @@ def test_a_change_is_appended_to_what_is_returned() -> None:
     ],
     ids=["CRLF", "byte order mark", "tabs", "umlaut", "backslash", "brackets"],
 )
-def test_layouts_stay(layout: object) -> None:
-    assert callable(layout)
-    data: bytes = layout(FILE)
+def test_layouts_stay(layout: Callable[[bytes], bytes]) -> None:
+    data = layout(FILE)
     for mark, site in _sites(data):
         for slot in Source(data).slots(site, mark.call.number):
             if isinstance(slot.value, float):

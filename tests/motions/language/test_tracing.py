@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -58,8 +59,9 @@ def test_a_mark_tells_what_moves_and_when() -> None:
         (lambda line: Timeline().hold(3.0).at(2.0).together(line), [(2.0, 2.5), (2.5, 3.0)]),
     ],
 )
-def test_marks_go_with_what_they_mark(made: object, spans: list[tuple[float, float]]) -> None:
-    assert callable(made)
+def test_marks_go_with_what_they_mark(
+    made: Callable[[Timeline], Timeline], spans: list[tuple[float, float]]
+) -> None:
     with traced():
         line = made(Timeline().body(x=0.01, over=0.5).home(over=0.5))
     found = sorted(

@@ -47,7 +47,8 @@ def test_every_kind_of_key_can_be_saved() -> None:
         own = {parent.__name__} if parent.__module__.startswith("motions.") else set()
         return own.union(*map(names, parent.__subclasses__()))
 
-    assert {kind.__name__ for kind in KINDS.values()} == names(Key) - {"Key"}
+    traced = {"CallMark"}  # taken out before anything is saved
+    assert {kind.__name__ for kind in KINDS.values()} == names(Key) - {"Key"} - traced
 
 
 @pytest.mark.parametrize("name", motion_names())

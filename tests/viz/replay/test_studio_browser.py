@@ -55,7 +55,7 @@ def _settle(tab: Tab) -> None:
 
 
 def _bar(tab: Tab, index: int) -> dict[str, Any]:
-    return tab.page.locator(f"[data-bar='{index}']").bounding_box() or {}
+    return dict(tab.page.locator(f"[data-bar='{index}']").bounding_box() or {})
 
 
 def test_an_edge_is_dragged(tab: Tab, file: Path) -> None:
