@@ -50,7 +50,7 @@ from go2_wbc.wbc.solvers import LIMITS, relaxed_qp, solve_with_multipliers, unkn
 
 MOTOR_TORQUE = 23.7  #: Scale of torques [N m]: of a hip's or a thigh's motor
 _TINY = 1e-7  # of a multiplier of (1), times its scale
-_ROUNDING = 1e-6  # of what gave way
+_TRIFLES = {"m/s^2": 0.01, "N": 0.1, "N m": 0.01, "rad/s^2": 0.1}  # of what gave way
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,12 +237,12 @@ def _gave_way(problem: Problem) -> Iterator[str]:
     z[unknowns(problem)] = x[:-12]
     off = (problem.equalities.A @ z - problem.equalities.b)[6:].reshape(-1, 3)
     for leg, row in zip(np.flatnonzero(problem.stance), np.linalg.norm(off, axis=1), strict=True):
-        if row > _ROUNDING:
+        if row > _TRIFLES["m/s^2"]:
             yield f"contact of {LEGS[leg].name} by {row:.3g} m/s^2"
     value, (_, lower, upper) = problem.bounds.C @ z, problem.bounds
     units = ["N"] * (len(value) - 24) + ["N m"] * 12 + ["rad/s^2"] * 12
     for row, excess in enumerate(np.maximum(lower - value, value - upper)):
-        if excess > _ROUNDING * (1.0 + abs(value[row])):
+        if excess > _TRIFLES[units[row]]:
             is_upper = bool(value[row] > upper[row])
             name = limit_of(problem, row, z, is_upper=is_upper).name
             yield f"{name} by {excess:.3g} {units[row]}"

@@ -121,14 +121,22 @@ class BindingLimit:
     @property
     def wider(self) -> str:
         """Whether "more" or "less" of the limit leaves more room."""
-        return "less" if self.side == "lower" and self.limit > 0.0 else "more"
+        return "less" if self.side == "lower" and self.limit >= 0.0 else "more"
+
+    @property
+    def offer(self) -> str:
+        """What one unit more gives, or what is left until other limits bind if that is less."""
+        step, gain = min(1.0, self.reach) if self.reach > _TINY else 1.0, self.gives
+        amount = f"{_short(step * gain.amount)} {gain.unit} of {gain.what}"
+        return f"{_short(step)} {self.unit} {self.wider} gives {amount}"
 
     def __str__(self) -> str:
-        gain = self.gives
-        return (
-            f"{self.name} at {self.limit:.3g} {self.unit}; 1 {self.unit} {self.wider} gives "
-            f"{gain.amount:.2g} {gain.unit} of {gain.what}"
-        )
+        return f"{self.name} at {_short(self.limit)} {self.unit}; {self.offer}"
+
+
+def _short(number: float) -> str:
+    """Two digits, or all before the point."""
+    return f"{number:.0f}" if abs(number) >= 10.0 else f"{number:.2g}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,19 +182,16 @@ class Explanation:
         return cut(f"<Explanation: {self}>")
 
     def table(self) -> str:
-        """One line for each limit, in at most 100 columns."""
+        """One line for each limit: where it is, its multiplier, what it costs and would give."""
         if self.contradiction is not None:
             return self.contradiction.table()
         if not self.binding:
             return str(self)
-        lines = [f"{'limit':<34}{'at':>14}{'multiplier':>12}{'cost':>9}  one more gives"]
+        lines = [f"{'limit':<27}{'at':>6}{'multiplier':>18}{'cost':>9}"]
         for row in self.binding:
-            gain = row.gives
-            lines.append(
-                f"{row.name:<34}{row.limit:>8.3g} {row.unit:<5}{row.multiplier:>12.3g}"
-                f"{row.cost:>9.3g}  {gain.amount:.2g} {gain.unit} of {gain.what}"
-            )
-        return "\n".join([*lines, f"{'cost of all tasks':<34}{self.cost:>35.3g}"])
+            at = f"{_short(row.limit):>6} {row.unit:<7}"
+            lines.append(f"{row.name:<27}{at}{row.multiplier:>10.3g}{row.cost:>9.3g}  {row.offer}")
+        return "\n".join([*lines, f"{'all tasks':<27}{self.cost:>33.3g}"])
 
 
 def _ranked(found: list[tuple[BindingLimit, float]]) -> list[tuple[BindingLimit, float]]:

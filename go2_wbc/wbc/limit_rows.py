@@ -92,11 +92,8 @@ def limit_of(problem: Problem, row: int, z: Array30, *, is_upper: bool) -> Limit
         share = weight / int(problem.stance.sum())
         return Limit(f"least normal force of {foot}", value, bound, "N", _times(bound, share))
     C = bounds.C[row, 18 + 3 * leg : 21 + 3 * leg]
-    most, mu = (
-        -float(C[2] * z[20 + 3 * leg]),
-        problem.source(FrictionPyramid).friction_for(problem.reference),
-    )
-    name = f"friction of {foot} {_direction(C)}"
+    mu = problem.source(FrictionPyramid).friction_for(problem.reference)
+    name, most = f"friction of {foot} {_direction(C)}", max(-float(C[2] * z[20 + 3 * leg]), 0.0)
     return Limit(name, value + most, most, "N", _times(FRICTION, mu))
 
 
@@ -131,7 +128,7 @@ def _joint_limit(problem: Problem, n: int, value: float, bound: float, *, is_upp
     fast = sqrt(max(radicand, 0.0)) - half
     if side * bound <= -braking or (radicand <= 0.0 and fast < most):
         unusual = -side * bound / LIMITS["joint limits"]
-        return Limit(f"braking of {name} before its limit", value, bound, "rad/s^2", unusual)
+        return Limit(f"braking of {name}", value, bound, "rad/s^2", unusual)
     if most <= fast:
         unusual = _times(float(speeds[n % 3 :: 3].max()), most)
         values = side * speed + h * value, side * most
