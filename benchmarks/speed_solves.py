@@ -12,6 +12,7 @@ from benchmarks.study import TrialResult
 from controller.assembly import build_pilot
 from controller.modes import Aborted
 from controller.sweeps.trials import Trial, TrialFailed
+from controller.telemetry import Telemetry
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.reference import Reference
@@ -22,6 +23,8 @@ from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
 from motions import compile_motion
 
 ROUNDS = 500  # Ticks of each contact mode that are solved
+BATCHES = 20  # Rounds over all ticks of what is too short for one
+TROT = 2  # Stance feet
 WARM_UP = 50  # Rounds before the measurement
 FASTER = {4: 3.5, 3: 3.5, 2: 3.0}
 """By number of stance feet (standing, high five, trot): how many times faster than PlaCo we are to
@@ -41,7 +44,13 @@ def _rows(feet: int) -> tuple[tuple[str, str, str], ...]:
     )
 
 
-TABLE = {f"tick of the QP, {feet} stance feet": _rows(feet) for feet in FASTER}
+TABLE = {
+    **{f"tick of the QP, {feet} stance feet": _rows(feet) for feet in FASTER},
+    "which limits bind, at a trot": (
+        ("noted", "multipliers recorded, a tick, scaled", "<= 2 us"),
+        ("explained", "`explain()`, scaled", "ms"),
+    ),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +118,30 @@ def measure_solves(trial: Trial, found: TrialResult) -> None:
             values |= {f"{feet}.{name}": median[name], f"{feet}.{name}_p99": p99[name]}
         values[f"{feet}.faster"] = median["placo"] / median["ours"]
         values[f"{feet}.tail"] = p99["ours"] / p99["placo"]
+        if feet == TROT:
+            values |= _explaining(ours, ticks)
+
+
+def _explaining(wbc: WholeBodyController, ticks: Sequence[Tick]) -> dict[str, float]:
+    """Median time of noting multipliers [us] in telemetry, and of an explanation [ms]."""
+    slow, telemetry = slowness(ticks), Telemetry(wbc.model, len(ticks))
+    solutions = [wbc.solve(tick.snapshot, tick.reference) for tick in ticks]
+    for tick in ticks:
+        telemetry.record(tick.snapshot, tick.reference.stance, "")
+    rounds = {"noted": list[float](), "explained": list[float]()}
+    for _ in range(BATCHES):
+        for name, act, many in (
+            ("noted", telemetry.note, solutions),
+            ("explained", WbcSolution.explain, solutions[::BATCHES]),
+        ):
+            start = time.thread_time_ns()
+            for solution in many:
+                act(solution)
+            rounds[name].append((time.thread_time_ns() - start) / 1e3 / len(many) / slow)
+    return {
+        "noted": float(np.median(rounds["noted"])),
+        "explained": float(np.median(rounds["explained"])) / 1e3,
+    }
 
 
 def interleaved(

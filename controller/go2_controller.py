@@ -30,6 +30,7 @@ from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import Health, RobotState
+from go2_wbc.wbc.explanation import Explanation
 from go2_wbc.wbc.tasks import Task
 
 _log = logging.getLogger(__name__)
@@ -115,10 +116,9 @@ class GO2Controller:
             self._resources = opened.pop_all()
         self._runner, self._description = self._pilot.runner, description
         self._motor, self._limits = config.motor, config.feasibility
-        self._closed, self._clipped = False, LogOnce(_log)
+        self._closed, self._clipped, self._planning = False, LogOnce(_log), threading.Lock()
         self._turn: dict[str, _Call] = {}  # what runs: one entry, or none
         self._last = Outcome(True, "lying, nothing asked yet", 0.0)
-        self._planning = threading.Lock()
 
     # --- postures -------------------------------------------------------------------------
 
@@ -390,6 +390,14 @@ class GO2Controller:
     def telemetry(self) -> Telemetry:
         """Peaks and counts of the run so far."""
         return self._runner.loop.telemetry
+
+    def explain(self) -> Explanation:
+        """Which limits were in the robot's way in the last tick, and what more of each would give.
+
+        Raises:
+            ModeError: if the whole-body QP had no part in it: the robot is limp, or lies down.
+        """
+        return Explanation.of(self._runner.between_ticks(self._runner.loop.problem))
 
     def recording(self, rate: float = 100.0) -> Recording:
         """The run so far (its last minutes), at about ``rate`` samples a second."""

@@ -22,7 +22,7 @@ import numpy as np
 from controller.behaviours import DAMPING, Behaviour, Damped
 from controller.pacing import REASON
 from controller.telemetry import Telemetry
-from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible
+from go2_wbc.errors import ModeError, PlantError, PlantTimeout, QpInfeasible
 from go2_wbc.planning.height_map import HeightMap, feel, fuse
 from go2_wbc.plant.base import Plant, Scan
 from go2_wbc.reference import JointReference, Reference, Target, hold_feet, sag_and_lean
@@ -35,6 +35,7 @@ from go2_wbc.robot.rigid_body import NO_PAYLOAD, Payload
 from go2_wbc.robot.safety import FallDetector, SafetyConfig, is_plausible
 from go2_wbc.robot.state import Health, JointCommand, RobotState, Snapshot
 from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
+from go2_wbc.wbc.problem import Problem
 from go2_wbc.wbc.solvers import is_grave
 
 _log = logging.getLogger(__name__)
@@ -103,6 +104,8 @@ class ControlLoop:
         self._commands = deque([JointCommand.damping(DAMPING)], LAGS)
         self._unanswered = 0
         self._qp_failures_in_a_row, self._grave_since = 0, inf
+        self._asked: tuple[WholeBodyController, Snapshot, Reference] | None = None
+        self._solution: WbcSolution | None = None
         is_up = self.state.tilt < safety.tilt_limit  # one that is found on its back has not fallen
         self.behaviour: Behaviour = Damped("lying", stays_on_belly=is_up)
         """What the robot does now."""
@@ -172,6 +175,20 @@ class ControlLoop:
             self.go_limp()
             raise
         self.telemetry.record(self.snapshot, target.stance, self.behaviour.label)
+        if self.telemetry.explains:
+            self.telemetry.note(self._solution)
+
+    def problem(self) -> Problem:
+        """The whole-body QP of the last tick.
+
+        Raises:
+            ModeError: if it had none.
+        """
+        if self._asked is None:
+            doing = self.behaviour.label
+            raise ModeError(f"nothing to explain: the robot is {doing}, without the whole-body QP")
+        wbc, snapshot, target = self._asked
+        return wbc.formulate(snapshot, target)
 
     def _observe(self) -> bool:
         """Read the plant; returns whether there is a new state."""
@@ -262,11 +279,13 @@ class ControlLoop:
         return planned or sag_and_lean(Target.of(target.row), self.snapshot)
 
     def _command(self, target: Reference | JointReference) -> JointCommand:
+        self._asked = self._solution = None
         if isinstance(target, JointReference):
             return JointCommand.servo(target.q_joints, target.v_joints, target.kp, target.kd)
         try:
             wbc = self._dynamic_wbc if self.behaviour.is_dynamic else self.wbc
-            solution = wbc.solve(self.snapshot, target, relax=True)
+            self._asked = wbc, self.snapshot, target
+            self._solution = solution = wbc.solve(self.snapshot, target, relax=True)
         except QpInfeasible as error:
             return self._without_solution(error)
         if solution.is_relaxed:

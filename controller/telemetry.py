@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass, replace
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -22,6 +22,8 @@ from go2_wbc.robot.motor import note_peaks
 from go2_wbc.robot.rigid_body import NO_PAYLOAD
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.validation import LARGEST, is_finite_number
+from go2_wbc.wbc.constraints import Multipliers
+from go2_wbc.wbc.controller import WbcSolution
 
 BLOCK = 4096
 """Ticks whose memory is asked for at once, 2.4 MB: numpy wants huge pages for 4 MB and more, and
@@ -44,9 +46,20 @@ class Tick(Record):
     feet: Float[np.ndarray, "12"]
 
 
+class Noted(Record):
+    """What is kept of the whole-body QP of a tick beside it, where that is asked for."""
+
+    multipliers: Multipliers
+    gave_way: bool
+    time: float
+
+
 _TICK = layout_of(Tick)
 _TIME = _TICK.fields["time"].start
 _Q, _V, _TAU, _FORCES, _STANCE, _COM, _FEET = map(_TICK.slice, Tick.part_names()[1:])
+_NOTED = layout_of(Noted)
+_MULTIPLIERS = _NOTED.slice("multipliers")
+_GAVE_WAY, _NOTED_AT = (_NOTED.fields[name].start for name in ("gave_way", "time"))
 
 
 class Telemetry:
@@ -58,6 +71,8 @@ class Telemetry:
         grave_ticks: those of them in which they gave way by more than ``wbc.solvers.LIMITS``.
         payload: what the robot is believed to carry beside its own parts.
         missed_deadlines: ticks that were not done when the next was due, at the wall clock's pace.
+        explains: whether the multipliers of the whole-body QP are recorded, too; may be set at any
+            time.
     """
 
     def __init__(self, model: RobotModel, capacity: int) -> None:
@@ -66,7 +81,8 @@ class Telemetry:
         self._capacity = capacity
         self._blocks: list[Float[np.ndarray, "k size"]] = []
         self._labels = np.empty(capacity, dtype=object)
-        self._count = 0
+        self._count, self.explains = 0, False
+        self._noted: dict[int, Float[np.ndarray, "k noted"]] = {}
         self._motor, self._peaks = packed(model.motor), np.zeros((3, 12))
         self._v_before: Float[np.ndarray, "12"] | None = None
         self._heights, self._kept_at = HeightMap(), np.full(3, np.inf)
@@ -93,6 +109,18 @@ class Telemetry:
         before = v if self._v_before is None else self._v_before
         note_peaks(state.tau, v, before, self._motor, self._peaks)
         self._v_before = v
+
+    def note(self, solution: WbcSolution | None) -> None:
+        """Add the multipliers of the tick that was recorded last; None if it had no solution."""
+        block, place = divmod((self._count - 1) % self._capacity, BLOCK)
+        rows = self._noted.get(block)
+        if rows is None:
+            rows = np.full((len(self._blocks[block]), _NOTED.size), np.nan)
+            self._noted[block] = rows
+        row = rows[place]
+        row[_MULTIPLIERS] = np.nan if solution is None else solution.multipliers.row
+        row[_GAVE_WAY] = solution is not None and solution.is_relaxed
+        row[_NOTED_AT] = self._blocks[block][place, _TIME]
 
     def see(self, heights: HeightMap, p_world_base: Array3) -> None:
         """Note what the ground is like around the robot."""
@@ -133,9 +161,8 @@ class Telemetry:
         times = self._taken(rows, slice(0, 1))[:, 0]
         first = np.searchsorted(times, since)
         rows, times = rows[first:], times[first:]
-        if len(rows) > 1:
-            span = float(times[-1] - times[0])
-            rows = rows[:: max(1, round((len(rows) - 1) / max(rate * span, 1.0)))]
+        noted = self._strongest(rows, times, step := _step(times, rate))
+        rows = rows[::step]
         labels = tuple(str(label) for label in self._labels[rows])
         taken = self._taken(rows, slice(None))
         recording = Recording(
@@ -149,9 +176,27 @@ class Telemetry:
             support_margin=np.full(len(rows), np.nan),
             labels=labels,
             robot=self._model.description.profile.name,
+            **noted,
         )
         grounds = (cells(self._heights), *reversed(self._grounds))
         return Samples(recording, taken[:, _FEET].reshape(-1, 4, 3), grounds)
+
+    def _strongest(
+        self, rows: Int[np.ndarray, " n"], times: Float[np.ndarray, " n"], step: int
+    ) -> dict[str, Any]:
+        """What was noted of every ``step`` ticks: a limit that binds in one of them is not lost."""
+        if not (self._noted and len(rows)):
+            return {}
+        noted = np.full((len(rows), _NOTED.size), np.nan)
+        blocks, places = np.divmod(rows, BLOCK)
+        for block, kept in self._noted.items():
+            noted[blocks == block] = kept[places[blocks == block]]
+        noted[noted[:, _NOTED_AT] != times] = np.nan  # of a tick that was overwritten
+        starts = range(0, len(rows), step)
+        least, most = np.fmin.reduceat(noted, starts), np.fmax.reduceat(noted, starts)
+        strongest = np.where(-least > most, least, most)
+        gave_way = strongest[:, _GAVE_WAY] > 0.0
+        return {"multipliers": strongest[:, _MULTIPLIERS], "gave_way": gave_way}
 
     def _taken(self, rows: Int[np.ndarray, " n"], columns: slice) -> Float[np.ndarray, "n k"]:
         """A copy of some columns of these rows."""
@@ -160,6 +205,13 @@ class Telemetry:
         for block in np.unique(blocks):
             taken[blocks == block] = self._blocks[block][places[blocks == block], columns]
         return taken
+
+
+def _step(times: Float[np.ndarray, " n"], rate: float) -> int:
+    """Of how many ticks one is taken for about ``rate`` samples a second."""
+    if len(times) < 2:
+        return 1
+    return max(1, round((len(times) - 1) / max(rate * float(times[-1] - times[0]), 1.0)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from importlib.metadata import entry_points
@@ -21,6 +22,7 @@ from go2_wbc.arguments import typed
 from go2_wbc.brief import cut, inline_html
 from go2_wbc.errors import EXTRAS, ConfigError, MissingDependency, install_line
 from go2_wbc.files import checked_output, write_atomically
+from go2_wbc.legs import JOINT_NAMES, LEGS
 
 if TYPE_CHECKING:
     import pandas
@@ -28,6 +30,34 @@ if TYPE_CHECKING:
 
 EXPORTS = {".mcap": "mcap", ".rrd": "rerun"}
 """Files for other viewers, and the extra that each needs."""
+
+
+_FEET = ("friction +x", "friction -x", "friction +y", "friction -y", "normal force")
+_JOINTS = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
+LIMIT_ROWS = (
+    *(f"{leg.name} {what}" for leg in LEGS for what in _FEET),
+    *(f"{joint} torque" for joint in _JOINTS),
+    *(f"{joint} acceleration" for joint in _JOINTS),
+)
+"""What each column of ``Recording.multipliers`` is of (``wbc.constraints.Multipliers``)."""
+CONTRADICTION = "limits contradict each other"
+
+
+def _limits() -> dict[str, Callable[[Float[np.ndarray, "n 44"]], Bool[np.ndarray, " n"]]]:
+    """What users call a limit, and where multipliers say that it binds."""
+    found = dict[str, Callable[..., Any]]()
+    for leg in LEGS:
+        feet = slice(5 * leg, 5 * leg + 4)
+        found[f"friction of {leg.name}"] = lambda y, k=feet: (np.abs(y[:, k]) > 0.0).any(axis=1)
+        found[f"least normal force of {leg.name}"] = lambda y, k=feet: y[:, k.stop] < 0.0
+        found[f"greatest normal force of {leg.name}"] = lambda y, k=feet: y[:, k.stop] > 0.0
+    for n, joint in enumerate(_JOINTS):
+        found[f"torque limit of {joint}"] = lambda y, k=20 + n: np.abs(y[:, k]) > 0.0
+        found[f"end or speed of {joint}"] = lambda y, k=32 + n: np.abs(y[:, k]) > 0.0
+    return found
+
+
+LIMITS = _limits()
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +94,10 @@ class Recording:
         model_file: its own MJCF or URDF, by which it is drawn; empty if it has none.
         ground: (k, 3) middles of the cells of ground that it has seen, each as it was found last
             [m]; none of a blind robot.
+        multipliers: (n, 44) of the limits of the whole-body QP, of each the strongest since the
+            sample (``LIMIT_ROWS`` says which); nan where it did not run. None unless the robot
+            recorded them (``go2.telemetry.explains``).
+        gave_way: (n,) whether limits contradicted each other, so that some gave way; as above.
     """
 
     time: Float[np.ndarray, " n"]
@@ -78,6 +112,8 @@ class Recording:
     robot: str = "go2"
     model_file: str = ""
     ground: Float[np.ndarray, "k 3"] = field(default_factory=partial(np.empty, (0, 3)))
+    multipliers: Float[np.ndarray, "m 44"] = field(default_factory=partial(np.empty, (0, 44)))
+    gave_way: Bool[np.ndarray, " m"] = field(default_factory=partial(np.empty, 0, bool))
 
     _repr_html_ = inline_html
 
@@ -90,6 +126,24 @@ class Recording:
         """Seconds between the first and the last sample."""
         return float(self.time[-1] - self.time[0]) if len(self.time) else 0.0
 
+    @property
+    def is_explained(self) -> bool:
+        """Whether it holds multipliers."""
+        return len(self.multipliers) > 0
+
+    def binding(self) -> tuple[Span, ...]:
+        """When which limit of the whole-body QP was in the way, and when limits gave way."""
+        if not self.is_explained:
+            return ()
+        time, last = self.time - self.time[0], len(self.time) - 1
+        flags = {name: test(self.multipliers) for name, test in LIMITS.items()}
+        spans = [
+            Span(float(time[run.start]), float(time[min(run.stop, last)]), name)
+            for name, rows in {**flags, CONTRADICTION: self.gave_way}.items()
+            for run in true_runs(rows)
+        ]
+        return tuple(sorted(spans, key=lambda span: span.start))
+
     @typed(late=True)
     def part(self, rows: slice | Int[np.ndarray, " k"]) -> Recording:
         """Some of the samples, with their times unchanged.
@@ -98,7 +152,8 @@ class Recording:
             rows: of the samples to keep, in increasing order.
         """
         labels = np.array(self.labels, dtype=object)[rows]
-        arrays = {name: getattr(self, name)[rows] for name in _ARRAYS}
+        names = (*_ARRAYS, *_NOTED) if self.is_explained else _ARRAYS
+        arrays = {name: getattr(self, name)[rows] for name in names}
         return replace(self, **arrays, labels=tuple(labels))
 
     @typed()
@@ -127,7 +182,7 @@ class Recording:
                 values |= {
                     name: str(file[name]) for name in ("robot", "model_file") if name in file
                 }
-                values |= {"ground": file["ground"]} if "ground" in file else {}
+                values |= {name: file[name] for name in ("ground", *_NOTED) if name in file}
                 labels = tuple(file["labels"].tolist())
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
             raise ConfigError(f"{path} is missing, damaged, or no recording of save()") from error
@@ -151,6 +206,10 @@ class Recording:
                 columns[name] = values
             else:
                 columns |= {f"{name}{i}": column for i, column in enumerate(values.T)}
+        if self.is_explained:
+            named = zip(LIMIT_ROWS, self.multipliers.T, strict=True)
+            columns |= {f"multiplier: {name}": column for name, column in named}
+            columns["gave_way"] = self.gave_way
         return pandas.DataFrame(columns)
 
     @typed()
@@ -209,3 +268,5 @@ def viewer(name: str) -> Any:  # noqa: ANN401 - each makes something else of a r
 
 _ARRAYS = tuple(field.name for field in fields(Recording))[:8]
 """The fields that have a row for each sample."""
+_NOTED = ("multipliers", "gave_way")
+"""Those that may have one."""

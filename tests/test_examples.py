@@ -63,6 +63,7 @@ POINTS = {
     "30_sport_client": ("version: 1", "'STAND_UP': 0, 'BALANCE_STAND': 0"),
     "31_walk_with_my_own_task": (r"0 tasks .* 0\.1\d\d rad/s", r"1 tasks .* rad/s, [345]\d%"),
     "32_stairs_by_sight": ("at first: <SeenTerrain", r"climbed (4[5-9]|5[01]) cm"),
+    "33_why_this_torque": ("standing: no limit binds", "a weak calf: torque", "contradicts the"),
 }
 """What must be read in the output of each: regular expressions."""
 DEAD_MOTORS = """

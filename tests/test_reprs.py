@@ -34,6 +34,7 @@ def test_no_public_value_fills_the_screen(go2: GO2Controller) -> None:
     steep = Timeline(name="dive").body(pitch=deg(60), over=0.3).home(over=0.3)
     values = [
         *(go2, go2.plant, go2.state, go2.health, go2.last_outcome, go2.telemetry, go2.command),
+        go2.explain(),
         *(go2.recording(), snapshot, snapshot.p_world_com, checker, checker.model, timeline, plan),
         *(plan.at(0.5), motions.check("wave"), motions.check(steep), checker.evaluate("wave")),
         *(*motions.check(steep).failures, motions.check("wave").series, go2_wbc.GAITS["trot"]),

@@ -34,6 +34,7 @@ from controller.cli.motion_args import (
 )
 from controller.cli.motion_preview import VIDEO_RATE
 from controller.modes import Mode
+from go2_wbc.brief import counted
 from go2_wbc.errors import ConfigError, PlantError, StanceMismatch
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from motions import CheckedMotion
 
 TELL_EVERY = 50  #: Ticks between two looks at the progress line
+MOST_LIMITS = 6  #: That are printed
 GETTING_READY = 2.5  #: About how long [s] the robot takes to stand up before the motion
 
 
@@ -83,6 +85,7 @@ def run(
     payload: Payload = None,
     sensors: Sensors = "ideal",
     seed: Annotated[int, "N", "of sensors and of what the world leaves open", whole] = 0,
+    explain: Annotated[bool, "also tell which limits were in the way; shown in the page"] = False,
     config: Numbers = None,
     scene: Annotated[Scene, "scene"],
     files: Annotated[Files, "files"],
@@ -98,6 +101,7 @@ def run(
         go2-wbc run wave --set side=left --html wave.html
         go2-wbc run my_motion.py --friction 0.5 --sensors imu --seed 3
         go2-wbc run my_motion.py --force    although the check says no
+        go2-wbc run wave --explain --html wave.html
         go2-wbc run wave --viewer --video wave.webp --export wave.mcap
         go2-wbc run wave --mjcf yard.xml --keyframe ramp    of `new yard --scene`
     """
@@ -124,13 +128,20 @@ def run(
     if not force:
         report.raise_if_infeasible()
     with getting_ready(plan, plant, line, numbers, viewer=scene.viewer) as (go2, truth):
+        go2.telemetry.explains = explain
         result = measure_motion(go2, truth, plan, checker.model)
         recording = go2.recording()
+    limits = times_in_the_way(recording)
     if json:
         where = {"friction": world.friction, "payload": world.payload}
-        print_json({"motion": plan.name, "feasible": report.ok, **where, **result.as_dict()})
+        told = {"limits": limits} if explain else {}
+        print_json(
+            {"motion": plan.name, "feasible": report.ok, **where, **result.as_dict(), **told}
+        )
     else:
         _print(plan.name, plan.duration, world, result)
+        if explain:
+            _print_limits(limits)
     _write(files, recording, checked, checker.model, is_quiet=json)
     return ExitCode.OK if result.ok else ExitCode.FAILED
 
@@ -231,3 +242,19 @@ def _print(name: str, duration: float, world: World, result: MotionMeasurement) 
         print(f"  {label:<38}{value:>10} {unit}")
     print("-" * 80)
     print("done" if result.ok else f"NOT done: {result.fall or result.reason}")
+
+
+def times_in_the_way(recording: Recording) -> dict[str, float]:
+    """For how long [s] each limit was in the way in a recording, the longest first."""
+    times: dict[str, float] = {}
+    for span in recording.binding():
+        times[span.label] = times.get(span.label, 0.0) + span.end - span.start
+    return {name: round(t, 3) for name, t in sorted(times.items(), key=lambda item: -item[1])}
+
+
+def _print_limits(times: dict[str, float]) -> None:
+    print("limits in the way:" if times else "no limit was in the way")
+    for name, seconds in [*times.items()][:MOST_LIMITS]:
+        print(f"  {name:<38}{seconds:>10.2f} s")
+    if (more := len(times) - MOST_LIMITS) > 0:
+        print(f"  and {counted(more, 'other')}, for less time")

@@ -210,6 +210,17 @@ def meet(
 
 
 @subroutine
+def tell_multipliers(w: WorkingSet, q: int, y: Vector) -> None:
+    """Fill the multiplier of each inequality, of which the sides of those taken are in ``y``."""
+    for i in range(len(y)):
+        if not w.taken[i]:
+            y[i] = 0.0
+    for i in range(q):
+        if len(y) > 0 and w.rows[i] >= 0:
+            y[w.rows[i]] *= w.u[i]
+
+
+@subroutine
 def constrain(
     L: Square,
     E: Float[np.ndarray, "k n"],
@@ -218,8 +229,12 @@ def constrain(
     lower: Bounds,
     upper: Bounds,
     x: Vector,
+    y: Vector,
 ) -> int:
-    """The same as ``solve_qp``, from the minimum x without constraints, with H = L L'."""
+    """The same as ``solve_qp``, from the minimum x without constraints, with H = L L'.
+
+    ``y`` may have no element where nobody asks for multipliers.
+    """
     n, m = len(x), len(lower)
     for i in range(m):
         if not lower[i] <= upper[i]:
@@ -241,6 +256,7 @@ def constrain(
     for _ in range(MAX_STEPS):
         row, sign, violation = most_violated(x, C, lower, upper, taken)
         if row < 0:
+            tell_multipliers(w, q, y)
             return SOLVED if np.isfinite(x).all() else UNFINISHED
         for j in range(n):
             normal[j] = sign * C[row, j]
@@ -248,6 +264,8 @@ def constrain(
         if q < 0:
             return INFEASIBLE if q == -1 else UNFINISHED
         taken[row] = True
+        if len(y) > 0:
+            y[row] = -sign
     return UNFINISHED
 
 
@@ -261,10 +279,16 @@ def solve_qp(
     lower: Bounds,
     upper: Bounds,
     x: Vector,
+    y: Vector,
 ) -> int:
-    """Fill the minimiser x; returns the outcome."""
+    """Fill the minimiser x; returns the outcome.
+
+    ``y``, of no or of m elements, gets the multipliers of the inequalities: H x + g + E'nu + C'y is
+    zero, y positive where the upper side binds, negative where the lower one does. They are by how
+    much the least cost falls for each unit by which that side is wider.
+    """
     L = np.empty((len(g), len(g)))
     if not factorise(H, L):
         return SINGULAR
     solve_factorised(L, g, x)
-    return constrain(L, E, e, C, lower, upper, x)
+    return constrain(L, E, e, C, lower, upper, x, y)

@@ -280,7 +280,7 @@ def solve_mpc(c: MpcConfig, h: Horizon) -> int:
     solve_factorised(L, g, x)
     C, lower, upper = np.empty((rows, n)), np.empty(rows), np.empty(rows)
     bound(c.force_max, h, feet, C, lower, upper)
-    outcome = constrain(L, np.empty((0, n)), np.empty(0), C, lower, upper, x)
+    outcome = constrain(L, np.empty((0, n)), np.empty(0), C, lower, upper, x, np.empty(0))
     for a in range(len(feet)):
         for i in range(3):
             h.forces[feet[a, 0], feet[a, 1], i] = x[3 * a + i]

@@ -11,7 +11,7 @@ from go2_wbc.reference import Target
 from go2_wbc.wbc.condensed import Reduction, reduce_equalities
 from go2_wbc.wbc.constraints import StanceFeetStill
 from go2_wbc.wbc.problem import SIZE, Problem
-from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
+from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp, unknowns
 
 
 def solve_full(problem: Problem, solver: str) -> Array30:
@@ -20,8 +20,7 @@ def solve_full(problem: Problem, solver: str) -> Array30:
     Raises:
         QpInfeasible: with the residual table of the best unconstrained point.
     """
-    unknown = np.concatenate([np.ones(18, dtype=bool), np.repeat(problem.stance, 3)])
-    Z, z0 = np.eye(SIZE)[:, unknown], np.zeros(SIZE)
+    Z, z0 = np.eye(SIZE)[:, unknowns(problem)], np.zeros(SIZE)
     return _embed(problem, dense_qp(problem, Z, z0, with_equalities=True), Z, z0, solver)
 
 

@@ -44,6 +44,7 @@ from go2_wbc.wbc.constraints import (
     BaseRows,
     Constraints,
     Limits,
+    Multipliers,
     StanceFeetStill,
     fill_base_dynamics,
     fill_limits,
@@ -203,6 +204,7 @@ class Decision(Record):
     z: Array30  #: see ``problem``
     tau: Array12  #: joint torques [N m] without friction
     tau_motors: Array12  #: those that the motors are told [N m]
+    multipliers: Multipliers  #: of the inequalities; all 0 if the tick met them by itself
 
 
 class Workspace(Record):
@@ -218,6 +220,7 @@ class Workspace(Record):
     C: Float[np.ndarray, "44 12"]  #: lower <= C u <= upper are the inequalities
     lower: Float[np.ndarray, "44"]
     upper: Float[np.ndarray, "44"]
+    y: Float[np.ndarray, "44"]  #: their multipliers
 
 
 @subroutine
@@ -364,11 +367,21 @@ def bound_unknowns(target: Target, limits: Limits, w: Workspace) -> int:
 
 
 @subroutine
-def solve_bounded(target: Target, w: Workspace) -> int:
+def solve_bounded(target: Target, w: Workspace, multipliers: Multipliers) -> int:
     """Move u from the minimum without bounds to that within all; returns the outcome."""
     m = bound_unknowns(target, w.limits, w)
     E, e = np.empty((0, 12)), np.empty(0)
-    return constrain(w.L, E, e, w.C[:m], w.lower[:m], w.upper[:m], w.u)
+    outcome = constrain(w.L, E, e, w.C[:m], w.lower[:m], w.upper[:m], w.u, w.y[:m])
+    count = 0
+    for leg in range(4):
+        if target.legs[leg] != STANCE:
+            continue
+        for n in range(5):
+            multipliers.forces[leg, n] = w.y[count]
+            count += 1
+    for n in range(12):
+        multipliers.torques[n], multipliers.joints[n] = w.y[count + n], w.y[count + 12 + n]
+    return outcome
 
 
 @subroutine
@@ -422,10 +435,11 @@ def solve_tick(
     fill_limits(now, target, c.constraints, w.limits)
     decide(target, w.reduction, w.u, decision.z)
     fill_tau(w.limits, decision.z, decision.tau)
+    numbers_of(decision.multipliers)[:] = 0.0
     outcome = SOLVED
     if not are_met(target, w.limits, decision):
         expand(target, w.reduction)
-        outcome = solve_bounded(target, w)
+        outcome = solve_bounded(target, w, decision.multipliers)
         decide(target, w.reduction, w.u, decision.z)
         fill_tau(w.limits, decision.z, decision.tau)
     fill_motor_torques(now, c.friction, decision.z, decision.tau, decision.tau_motors)

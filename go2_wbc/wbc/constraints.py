@@ -63,6 +63,18 @@ class Limits(Record):
     joints_upper: Array12
 
 
+class Multipliers(Record):
+    """The multiplier of every inequality, in the places of ``Limits``, per unit of its row.
+
+    By how much the least cost sum w |A z - b|^2 / 2 falls for a row that is one unit wider;
+    positive where its upper side binds, negative where the lower one does, 0 where none does.
+    """
+
+    forces: Float[np.ndarray, "4 5"]  #: [1/N]
+    torques: Array12  #: [1/(N m)]
+    joints: Array12  #: [s^2/rad]
+
+
 class BaseRows(Record):
     """The base's rows A z = b of M a + h = J' f."""
 

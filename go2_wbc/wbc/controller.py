@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -36,8 +36,10 @@ from go2_wbc.wbc.constraints import (
     Equality,
     FloatingBaseDynamics,
     Inequality,
+    Multipliers,
     torque_map,
 )
+from go2_wbc.wbc.explanation import Explanation, multipliers_of
 from go2_wbc.wbc.problem import ACCELERATION, FORCES, SIZE, Bounds, Problem, Rows, Source
 from go2_wbc.wbc.solvers import check_solver, solve_relaxed
 from go2_wbc.wbc.tasks import BuiltInTasks, Task
@@ -47,7 +49,7 @@ GREATEST_EXTRA_WEIGHT = 1e4
 BACKENDS = ("condensed", "full", "placo")  #: Names of the back ends, the usual one first
 _IN_BODY = frozenset(BodyTarget.__dataclass_fields__)
 _IN_STATE = ("q", "v")
-_Z, _TAU, _MOTORS = (layout_of(Decision).slice(part) for part in ("z", "tau", "tau_motors"))
+_Z, _TAU, _MOTORS, _MULTIPLIERS = map(layout_of(Decision).slice, Decision.part_names())
 _NO_ROWS, _DECISION = np.empty((0, SIZE + 2)), layout_of(Decision).size
 
 
@@ -71,6 +73,7 @@ class WbcSolution:
     _formulate: Callable[[], Problem]
     _z: Array30
     is_relaxed: bool = False
+    _row: Float[np.ndarray, " size"] | None = field(default=None, repr=False)
 
     __repr__ = brief
 
@@ -82,7 +85,8 @@ class WbcSolution:
         formulate: Callable[[], Problem],
     ) -> WbcSolution:
         """The solution whose arrays ``row`` holds (see ``condensed.Decision``)."""
-        return WbcSolution(row[_TAU], row[_MOTORS], solve_time, backend, formulate, row[_Z])
+        z = row[_Z]
+        return WbcSolution(row[_TAU], row[_MOTORS], solve_time, backend, formulate, z, False, row)
 
     @staticmethod
     def from_decision(
@@ -118,6 +122,17 @@ class WbcSolution:
         problem = self._formulate()
         constraints = len(problem.sources) - sum(isinstance(s, Task) for s in problem.sources)
         return problem.residuals(self._z)[-constraints:]
+
+    @property
+    def multipliers(self) -> Multipliers:
+        """Of every inequality: written by the compiled solve, else solved for (``explanation``)."""
+        if self._row is not None:
+            return Multipliers.of(self._row[_MULTIPLIERS])
+        return multipliers_of(self._formulate(), is_relaxed=self.is_relaxed)
+
+    def explain(self) -> Explanation:
+        """Which limits bind and what more of each would give, or which contradict each other."""
+        return Explanation.of(self._formulate())
 
     @property
     def command(self) -> JointCommand:
@@ -256,6 +271,17 @@ class WholeBodyController:
         )
         motors = self._friction.motor_torques(snapshot, solution.qdd, solution.tau)
         return replace(solution, tau_motors=motors)
+
+    @typed(late=True)
+    def explain(self, snapshot: Snapshot, reference: Reference) -> Explanation:
+        """Which limits bind in a tick and what more of each would give, or why it has no solution.
+
+        Raises:
+            QpInfeasible: for numbers that are not finite; names the array.
+            ConfigError: for a task or constraint whose rows do not fit.
+        """
+        check_inputs(snapshot, reference, self._solver)
+        return Explanation.of(self.formulate(snapshot, reference))
 
     def _relaxed(self, problem: Problem, error: QpInfeasible) -> Array30:
         try:

@@ -147,16 +147,27 @@ def solve_dense_qp(qp: DenseQp, solver: str) -> Float[np.ndarray, " n"]:
     return x
 
 
-def _by_active_set(qp: DenseQp, solver: str) -> Float[np.ndarray, " n"]:
+def solve_with_multipliers(
+    qp: DenseQp,
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " m"]]:
+    """The minimiser by our active set, and the multiplier of each inequality (``solve_qp``).
+
+    Raises:
+        QpInfeasible: if it finds none.
+    """
     from go2_wbc.algebra.active_set import MESSAGES, SOLVED, solve_qp
 
-    x = np.empty(len(qp.g))
+    x, y = np.empty(len(qp.g)), np.empty(len(qp.lower))
     arrays = (qp.H, qp.g, *qp.equalities, qp.C, qp.lower, qp.upper)
     H, g, E, e, C, lower, upper = (np.ascontiguousarray(array, float) for array in arrays)
-    outcome = solve_qp(H, g, E, e, C, lower, upper, x)
+    outcome = solve_qp(H, g, E, e, C, lower, upper, x, y)
     if outcome != SOLVED:
-        raise QpInfeasible(solver, MESSAGES[outcome])
-    return x
+        raise QpInfeasible("active_set", MESSAGES[outcome])
+    return x, y
+
+
+def _by_active_set(qp: DenseQp, _solver: str) -> Float[np.ndarray, " n"]:
+    return solve_with_multipliers(qp)[0]
 
 
 def _by_qpsolvers(qp: DenseQp, solver: str) -> Float[np.ndarray, " n"] | None:
@@ -212,7 +223,24 @@ def solve_relaxed(problem: Problem, solver: str) -> Array30:
         QpInfeasible: for a reference that no robot could meet: numbers that are not finite, or a
             least force above the greatest.
     """
-    unknown = np.concatenate([np.ones(18, dtype=bool), np.repeat(problem.stance, 3)])
+    unknown = unknowns(problem)
+    z = np.zeros(SIZE)
+    z[unknown] = solve_dense_qp(relaxed_qp(problem), solver)[:-12]
+    return z
+
+
+def unknowns(problem: Problem) -> Bool[np.ndarray, "30"]:
+    """Which of z are not known to be zero: accelerations, and forces of feet that stand."""
+    return np.concatenate([np.ones(18, dtype=bool), np.repeat(problem.stance, 3)])
+
+
+def relaxed_qp(problem: Problem) -> DenseQp:
+    """The relaxed problem, in the unknowns of z and the slack of the 12 joint limits.
+
+    Raises:
+        QpInfeasible: for a least force above the greatest.
+    """
+    unknown = unknowns(problem)
     n = int(unknown.sum())
     root = np.sqrt(problem.weights)
     A, b = root[:, None] * problem.tasks.A[:, unknown], root * problem.tasks.b
@@ -230,10 +258,7 @@ def solve_relaxed(problem: Problem, solver: str) -> Array30:
     H[n:, n:] = SLACK_WEIGHT * np.eye(12)
     C, lower, upper = _relaxed_bounds(problem, unknown)
     hard = np.concatenate([E[base], np.zeros((6, 12))], axis=1)
-    x = solve_dense_qp(DenseQp(H, g, C, lower, upper, hard, e[base]), solver)
-    z = np.zeros(SIZE)
-    z[unknown] = x[:n]
-    return z
+    return DenseQp(H, g, C, lower, upper, hard, e[base])
 
 
 def _relaxed_bounds(

@@ -259,7 +259,8 @@ def solve_forces(
         upper[row] = 0.0 if is_friction else c.force_max * feet.share[foot]
     if k > 0:
         fill_cost(feet, wrench, scale, c, H, g)
-        if solve_qp(H, g, np.empty((0, n)), np.empty(0), C, lower, upper, x) != SOLVED:
+        none = np.empty(0)
+        if solve_qp(H, g, np.empty((0, n)), none, C, lower, upper, x, none) != SOLVED:
             x[:] = 0.0
     for r in range(6):
         feet.missing[r] = wrench[r]

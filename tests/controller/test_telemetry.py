@@ -8,7 +8,10 @@ import pytest
 from controller.telemetry import BLOCK, Telemetry
 from go2_wbc.errors import CommandError
 from go2_wbc.planning.height_map import DOWNS, HeightMap, fuse
+from go2_wbc.records import layout_of
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.wbc.condensed import Decision
+from go2_wbc.wbc.controller import WbcSolution
 from tests.controller.plants import lying_state
 
 CAPACITY = 50
@@ -142,3 +145,44 @@ def test_ground_is_kept_when_it_is_left_behind_and_told_as_it_was_found_last(
     ground = telemetry.samples().recording().ground
     found = dict(zip(ground[:, 0].round(2).tolist(), ground[:, 2].round(3).tolist(), strict=True))
     assert found == {0.51: 0.15, 1.01: 0.2, 20.51: 0.3, 20.76: 0.4}
+
+
+def solved(number: float, *, is_relaxed: bool = False) -> WbcSolution:
+    """One whose multipliers are all that number."""
+    row = np.full(layout_of(Decision).size, number)
+    solution = WbcSolution.of_row(row, 0.0, "condensed", lambda: None)  # type: ignore[arg-type]
+    return replace(solution, is_relaxed=is_relaxed)
+
+
+def test_multipliers_are_kept_of_the_ticks_in_which_they_were_wanted(model: RobotModel) -> None:
+    telemetry = recorded(model, 4)
+    assert not telemetry.samples().recording().is_explained
+    for tick in range(4, 12):
+        telemetry.record(model.snapshot(lying_state(tick * PERIOD)), ALL, "explained")
+        telemetry.note(solved(float(tick)) if tick != 8 else None)
+    recording = telemetry.samples(rate=1 / PERIOD).recording()
+    wanted = [*[np.nan] * 4, *range(4, 8), np.nan, *range(9, 12)]
+    np.testing.assert_array_equal(recording.multipliers, np.tile(wanted, (44, 1)).T)
+    assert not recording.gave_way.any()
+
+
+def test_a_tick_that_was_overwritten_is_not_told_by_its_successor(model: RobotModel) -> None:
+    telemetry = Telemetry(model, CAPACITY)
+    for tick in range(CAPACITY + 10):
+        telemetry.record(model.snapshot(lying_state(tick * PERIOD)), ALL, "")
+        if tick < CAPACITY:
+            telemetry.note(solved(1.0))
+    multipliers = telemetry.samples(rate=1 / PERIOD).recording().multipliers
+    assert np.isnan(multipliers[-10:]).all()
+    assert (multipliers[:-10] == 1.0).all()
+
+
+def test_a_limit_that_binds_for_one_tick_is_in_the_thinned_recording(model: RobotModel) -> None:
+    telemetry = Telemetry(model, CAPACITY)
+    for tick in range(40):
+        telemetry.record(model.snapshot(lying_state(tick * PERIOD)), ALL, "")
+        telemetry.note(solved({7: -3.0, 8: 2.0}.get(tick, 0.0), is_relaxed=tick == 23))
+    recording = telemetry.samples(rate=100.0).recording()
+    assert len(recording.time) == 8
+    assert recording.multipliers[:, 0].tolist() == [0.0, -3.0, *[0.0] * 6]
+    assert recording.gave_way.tolist() == [k == 4 for k in range(8)]

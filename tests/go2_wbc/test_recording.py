@@ -1,13 +1,13 @@
 """A recording can be cut, and tells what was done when."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from go2_wbc.errors import ConfigError
-from go2_wbc.recording import Recording
+from go2_wbc.recording import LIMIT_ROWS, Recording
 
 
 @pytest.fixture
@@ -27,6 +27,8 @@ def recording() -> Recording:
         robot="a1",
         model_file="my_a1.xml",
         ground=rng.normal(size=(7, 3)),
+        multipliers=rng.normal(size=(5, 44)),
+        gave_way=rng.random(5) < 0.5,
     )
 
 
@@ -58,7 +60,9 @@ def test_labels_become_spans_a_part_may_be_empty_and_all_is_a_table_for_pandas(
     table = pytest.importorskip("pandas") and recording.to_dataframe()
     assert list(table.columns[:3]) == ["time", "label", "q0"]
     assert table["stance3"].tolist() == recording.stance[:, 3].tolist()
-    assert table.shape == (5, 2 + 19 + 18 + 12 + 4 + 4 + 3 + 1)
+    assert table.shape == (5, 2 + 19 + 18 + 12 + 4 + 4 + 3 + 1 + 44 + 1)
+    torque = table["multiplier: FR_calf torque"]
+    assert torque.tolist() == recording.multipliers[:, 25].tolist()
 
 
 def test_a_recording_is_saved_and_loaded_whole(recording: Recording, tmp_path: Path) -> None:
@@ -76,3 +80,34 @@ def test_a_file_that_is_no_recording_is_told_so(content: bytes | None, tmp_path:
         path.write_bytes(content)
     with pytest.raises(ConfigError, match=r"run.npz is missing, damaged, or no recording"):
         Recording.load(path)
+
+
+def test_what_binds_is_told_by_name_and_time(recording: Recording) -> None:
+    y = np.zeros((5, 44))
+    y[0] = np.nan  # no whole-body QP
+    y[1:3, LIMIT_ROWS.index("FR friction -y")] = 0.1
+    y[2, LIMIT_ROWS.index("RL normal force")] = -0.2
+    y[4, LIMIT_ROWS.index("RL normal force")] = 0.2
+    y[3, LIMIT_ROWS.index("FL_calf torque")] = -0.3
+    y[3, LIMIT_ROWS.index("RR_thigh acceleration")] = 0.3
+    told = replace(recording, multipliers=y, gave_way=np.arange(5) == 4).binding()
+    assert [(span.label, round(span.start, 3), round(span.end, 3)) for span in told] == [
+        ("friction of FR", 0.1, 0.3),
+        ("least normal force of RL", 0.2, 0.3),
+        ("torque limit of FL_calf", 0.3, 0.4),
+        ("end or speed of RR_thigh", 0.3, 0.4),
+        ("greatest normal force of RL", 0.4, 0.4),
+        ("limits contradict each other", 0.4, 0.4),
+    ]
+
+
+def test_one_that_was_not_explained_says_so_and_loads_as_before(
+    recording: Recording, tmp_path: Path
+) -> None:
+    silent = replace(recording, multipliers=np.empty((0, 44)), gave_way=np.empty(0, bool))
+    assert recording.is_explained
+    assert not silent.is_explained
+    assert silent.binding() == ()
+    assert len(silent.part(slice(1, 3)).multipliers) == 0
+    loaded = Recording.load(silent.save(tmp_path / "silent.npz"))
+    assert not loaded.is_explained

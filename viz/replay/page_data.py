@@ -22,7 +22,7 @@ from dataclasses import asdict, replace
 from importlib import resources
 from pathlib import Path
 from types import SimpleNamespace
-from typing import NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import meshcat
 import meshcat.geometry as shapes
@@ -35,7 +35,7 @@ from go2_wbc.arguments import typed
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.legs import LEGS
-from go2_wbc.recording import Recording
+from go2_wbc.recording import Recording, Span
 from viz.content import MarginCurve, ReplayContent, Verdict, checked_content
 from viz.render.camera import smoothed
 from viz.render.ground import COLORS, grid_of
@@ -279,7 +279,10 @@ def content_text(content: ReplayContent, title: str, version: str = "") -> str:
         "ghost": None,
         "ground": None,
         "written": None,
+        "binding": None,
     }
+    if content.recording.is_explained:
+        header["binding"] = _binding(content.recording.binding(), 1.0 / rate)
     if len(content.recording.ground):
         grid = grid_of(content.recording.ground)
         heights = np.where(np.isnan(grid.z), UNKNOWN, np.round(1000.0 * grid.z))
@@ -353,6 +356,19 @@ def _add_frames(
     return {"rate": rate, "frames": len(frames["q"])}
 
 
+def _binding(spans: tuple[Span, ...], gap: float) -> list[tuple[float, float, str]]:
+    """Start, end [s] and name of what bound; breaks of at most ``gap`` are left out."""
+    joined, last = list[list[Any]](), dict[str, list[Any]]()
+    for span in spans:
+        before = last.get(span.label)
+        if before is not None and span.start - before[1] <= gap:
+            before[1] = round(span.end, 3)
+            continue
+        last[span.label] = [round(span.start, 3), round(span.end, 3), span.label]
+        joined.append(last[span.label])
+    return [(start, end, label) for start, end, label in joined]
+
+
 def _add_verdict(pack: Pack, verdict: Verdict) -> dict[str, object]:
     curves = []
     for k, curve in enumerate(map(reduced, verdict.ranked())):
@@ -385,7 +401,7 @@ def reduced(curve: MarginCurve) -> MarginCurve:
 
 HTML_SUFFIXES = (".html", ".htm")
 PAGE_LIMIT = 4_000_000  #: Largest page [bytes]
-_SCRIPTS = "data stage scene ghost steps flags charts trust verdict sound app"
+_SCRIPTS = "data stage scene ghost steps flags charts binding trust verdict sound app"
 """Of the assets, in the order in which they need one another; a live page has another one."""
 
 

@@ -180,12 +180,14 @@ def test_export_writes_the_same_trajectory_as_csv_and_npz(tmp_path: Path, run: R
 @pytest.mark.slow
 def test_run_plays_a_motion_and_measures_it(tmp_path: Path, clumsy: Path, run: Run) -> None:
     page = tmp_path / "bow.html"
-    text = run("run", "bow", "--html", page).out
+    text = run("run", "bow", "--explain", "--html", page).out
     assert "\ndone\n" in text
+    assert "no limit was in the way\n" in text or "limits in the way:\n" in text
     assert text.startswith("bow, ")
     assert "as it was checked: friction 0.5\n" in text
     header, arrays = read_data(page.read_text(encoding="utf-8"))
     assert not header["is_plan"]
+    assert header["binding"] is not None
     assert header["verdict"]["ok"]
     shared = min(len(arrays["q"]), len(arrays["ghost.q"]))
     apart = np.abs(arrays["q"][:shared] - arrays["ghost.q"][:shared])
@@ -194,8 +196,10 @@ def test_run_plays_a_motion_and_measures_it(tmp_path: Path, clumsy: Path, run: R
     assert "infeasible" in run("run", f"{clumsy}:fall_over", code=ExitCode.FAILED).err
     said = run("run", clumsy, code=ExitCode.USAGE)
     assert "choose FILE.py:NAME: fall_over, second" in said.err
-    said = run("run", f"{clumsy}:fall_over", "--force", "--json", code=ExitCode.FAILED)
+    words = ("--force", "--explain", "--json")
+    said = run("run", f"{clumsy}:fall_over", *words, code=ExitCode.FAILED)
     result = json.loads(said.out)
+    assert max(result["limits"].values()) == next(iter(result["limits"].values())) > 0.0
     assert not result["ok"]
     assert not result["feasible"]
 

@@ -9,6 +9,7 @@ from go2_wbc.algebra.active_set import BAD_BOUNDS, INFEASIBLE, SINGULAR, SOLVED,
 N, M = 4, 9
 EXACT = 1e-9  # of numbers of order one
 NONE = np.empty((0, N)), np.empty(0)
+NO_Y = np.empty(0)
 Qp = tuple[np.ndarray, ...]
 
 
@@ -25,7 +26,7 @@ def random_qp(seed: int, equalities: int) -> Qp:
 def solved(*qp: np.ndarray) -> np.ndarray:
     x = np.empty(N)
     H, g, E, e, C, lower, upper = qp
-    assert solve_qp(H, g, E, e, C, lower, upper, x) == SOLVED
+    assert solve_qp(H, g, E, e, C, lower, upper, x, NO_Y) == SOLVED
     return x
 
 
@@ -46,6 +47,23 @@ def test_the_answer_meets_the_conditions_of_optimality(equalities: int) -> None:
     assert active > 40
 
 
+@pytest.mark.parametrize("equalities", [0, 1, 2])
+def test_its_multipliers_balance_the_gradient(equalities: int) -> None:
+    binding = 0
+    for seed in range(40):
+        H, g, E, e, C, lower, upper = random_qp(seed, equalities)
+        x, y = np.empty(N), np.full(M, np.nan)
+        assert solve_qp(H, g, E, e, C, lower, upper, x, y) == SOLVED
+        value = C @ x
+        assert ((y <= 0.0) | (upper - value < EXACT)).all()
+        assert ((y >= 0.0) | (value - lower < EXACT)).all()
+        gradient = H @ x + g + C.T @ y
+        w = np.linalg.lstsq(-E.T, gradient, rcond=None)[0]
+        np.testing.assert_allclose(gradient + E.T @ w, 0.0, atol=EXACT)
+        binding += np.count_nonzero(y)
+    assert binding > 40
+
+
 @pytest.mark.parametrize("scale", [1e-5, 1e5])
 def test_in_what_unit_a_row_is_written_changes_nothing(scale: float) -> None:
     for seed in range(10):
@@ -63,16 +81,16 @@ def test_an_equality_that_others_imply_is_left_out_and_one_that_contradicts_them
     np.testing.assert_allclose(found, wanted, atol=EXACT)
     told[-1] += 1e-6
     x = np.empty(N)
-    assert solve_qp(H, g, twice, np.array(told), C, lower, upper, x) == INFEASIBLE
+    assert solve_qp(H, g, twice, np.array(told), C, lower, upper, x, NO_Y) == INFEASIBLE
 
 
 def test_what_has_no_answer_is_told() -> None:
     one, x = np.eye(1, N), np.empty(N)
     H, g, least, most = np.eye(N), np.zeros(N), np.array([1.0]), np.array([2.0])
-    assert solve_qp(H, g, *NONE, one, most, least, x) == BAD_BOUNDS
-    assert solve_qp(H, g, *NONE, one, np.array([np.nan]), most, x) == BAD_BOUNDS
-    assert solve_qp(np.diag([1.0, 1.0, 1.0, 0.0]), g, *NONE, one, least, most, x) == SINGULAR
+    assert solve_qp(H, g, *NONE, one, most, least, x, NO_Y) == BAD_BOUNDS
+    assert solve_qp(H, g, *NONE, one, np.array([np.nan]), most, x, NO_Y) == BAD_BOUNDS
+    assert solve_qp(np.diag([1.0, 1.0, 1.0, 0.0]), g, *NONE, one, least, most, x, NO_Y) == SINGULAR
     both, apart = np.concatenate([one, one]), np.array([1.0, 3.0])
-    assert solve_qp(H, g, *NONE, both, apart, apart + 0.5, x) == INFEASIBLE
+    assert solve_qp(H, g, *NONE, both, apart, apart + 0.5, x, NO_Y) == INFEASIBLE
     np.testing.assert_allclose(solved(H, g, *NONE, one, least, most), [1.0, 0.0, 0.0, 0.0])
     np.testing.assert_allclose(solved(H, g, *NONE, one, -most, -least), [-1.0, 0.0, 0.0, 0.0])

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from go2_wbc.recording import Recording
+from go2_wbc.recording import LIMIT_ROWS, Recording
 from tests.viz.replay.browsing import DRAWN, Tab
 from tests.viz.replay.conftest import OpenPage
 from tests.viz.synthetic import step_ahead
@@ -179,3 +179,28 @@ def test_the_ground_that_was_seen_is_drawn_by_its_height(
     redder = stage[:, :, 0] - stage[:, :, 2]
     assert (redder > 40).mean() > 0.05  # the step, and the level before it
     assert (redder < -30).mean() > 0.1
+
+
+def test_what_is_in_the_way_is_told_and_drawn_in_its_legs_lane(
+    recording: Recording, open_page: OpenPage
+) -> None:
+    y = np.zeros((len(recording.time), 44))
+    y[50:80, LIMIT_ROWS.index("RL_calf torque")] = 1.0
+    y[60:80, LIMIT_ROWS.index("RL friction +x")] = 1.0
+    gave_way = np.zeros(len(y), dtype=bool)
+    with open_page(replace(recording, multipliers=y, gave_way=gave_way)) as tab:
+        tab.evaluate("replay.scrub(0.7)")
+        assert tab.text("#binding p") == "In the way: torque limit of RL_calffriction of RL"
+        tab.evaluate("replay.scrub(2.0)")
+        assert tab.text("#binding p").startswith("In the way: none")
+        lanes = tab.evaluate(
+            """(() => { const chart = replay.charts.find((one) => one instanceof Binding);
+            const paint = chart.picture.getContext("2d"), ratio = window.devicePixelRatio;
+            const x = chart.xAt(0.55) * ratio, row = chart.height * ratio / 4;
+            return [0, 1, 2, 3].map((k) => [...paint.getImageData(x, (k + 0.4) * row, 1, 1).data]);
+            })()"""
+        )
+        assert [lane[:3] == [168, 85, 247] for lane in lanes] == [False, False, True, False]
+        assert tab.complaints == []
+    with open_page(recording) as tab:
+        assert tab.evaluate("document.getElementById('binding').hidden") is True

@@ -16,7 +16,7 @@ import pytest
 import viz
 from controller.report_view import planned
 from go2_wbc.errors import ConfigError
-from go2_wbc.recording import Recording
+from go2_wbc.recording import LIMIT_ROWS, Recording
 from motions import FeasibilityChecker
 from tests.viz.page_reader import packed_parts, placement, read_data
 from tests.viz.synthetic import step_ahead
@@ -61,6 +61,21 @@ def test_the_ground_that_was_seen_is_in_the_page(recording: Recording, tmp_path:
     assert (arrays["ground"][row, column], arrays["ground"][0, 0]) == (200, -32768)
     assert arrays["target"].shape == (header["frames"], 3)
     assert arrays["target"][:, 2] == pytest.approx(0.0, abs=0.1)
+
+
+def test_what_bound_is_in_the_page_without_its_short_breaks(
+    recording: Recording, tmp_path: Path
+) -> None:
+    y, n = np.zeros((len(recording.time), 44)), len(recording.time)
+    y[[10, 12, 13, 60], LIMIT_ROWS.index("FL_calf torque")] = 1.0
+    explained = replace(recording, multipliers=y, gave_way=np.arange(n) == 100)
+    page = viz.export_html(explained, tmp_path / "a.html", title="a").read_text(encoding="utf-8")
+    torque, near = "torque limit of FL_calf", pytest.approx
+    assert read_data(page)[0]["binding"] == [
+        [near(0.1), near(0.14), torque],
+        [near(0.6), near(0.61), torque],
+        [near(1.0), near(1.01), "limits contradict each other"],
+    ]
 
 
 def test_the_page_has_every_element_and_style_that_its_scripts_name(page: str) -> None:

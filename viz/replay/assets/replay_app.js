@@ -191,6 +191,7 @@ function makeCharts(data) {
   const card = (name) => document.querySelector(`[data-curve=${name}]`);
   return [
     new Timeline(document.getElementById("timeline"), data),
+    new Binding(document.getElementById("binding"), data),
     new Curve(card("margin"), data, {
       name: "margin", scale: 100, unit: "cm", digits: 1, limit: 0, least: 0.5, isBad: (v) => v < 0,
     }),
