@@ -194,11 +194,12 @@ class Actuation:
 
     def command(self, action: Float[np.ndarray, "12"]) -> JointCommand:
         """What the motors are told for an action; what is beyond 1 is cut."""
-        action = np.clip(action.astype(float), -1.0, 1.0)
+        action, zeros = np.clip(action.astype(float), -1.0, 1.0), np.zeros(12)
         if self.kind == TORQUES:
             return JointCommand.torque(action * self.torque_limits)
         targets = np.array(self.stance) + self.reach * action
-        return JointCommand.servo(targets, np.zeros(12), self.kp, self.kd)
+        gains = np.full(12, self.kp), np.full(12, self.kd)
+        return JointCommand(zeros, targets, zeros, *gains)
 
     def action(self, meant: Float[np.ndarray, "*n 12"]) -> Float32[np.ndarray, "*n 12"]:
         """The action that comes nearest to joint targets [rad], or torques [N m]."""
