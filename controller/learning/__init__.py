@@ -1,4 +1,4 @@
-"""The simulated robot for learners: Gymnasium's environments.
+"""The simulated robot for learners: Gymnasium's environments, and the expert's data sets.
 
 Importing this registers the environments where Gymnasium is installed. So does
 ``gymnasium.make("controller.learning:Go2-v0")``; version 1 of Gymnasium knows no entry points.
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from controller.learning.dataset import read_dataset, record
     from controller.learning.environment import Go2Env
     from controller.learning.tasks import TASKS, LearningTask
     from controller.learning.vector import Go2VectorEnv
@@ -25,6 +26,8 @@ __all__ = [
     "Go2Env",
     "Go2VectorEnv",
     "LearningTask",
+    "read_dataset",
+    "record",
 ]
 
 ENVIRONMENTS = {"Go2-v0": "velocity", "Go2Rough-v0": "rough", "Go2Push-v0": "push"}

@@ -17,6 +17,8 @@ from controller.learning import rewards
 from controller.learning.tasks import LearningTask, find_task
 from controller.observation import (
     ACTIONS,
+    KD,
+    KP,
     OBSERVATION,
     RATE,
     STANCE,
@@ -70,8 +72,8 @@ class Go2Env(gymnasium.Env[Seen, np.ndarray]):
         terms: tuple[str, ...] = OBSERVATION.names,
         sensors: str = "ideal",
         randomise: bool = True,
-        kp: float = 40.0,
-        kd: float = 1.0,
+        kp: float = KP,
+        kd: float = KD,
         episode_time: float = 20.0,
         render_mode: str | None = None,
     ) -> None:
@@ -83,8 +85,7 @@ class Go2Env(gymnasium.Env[Seen, np.ndarray]):
             terms: of the observation, in this order.
             sensors: "ideal", or "noisy" for white noise on all that is measured.
             randomise: draw world, delay, heading and start; False takes the middle of each.
-            kp, kd: of the servo [N m/rad], [N m s/rad]; published policies have 20 to 40 and 0.5
-                to 1.
+            kp, kd: of the servo [N m/rad], [N m s/rad].
             episode_time: after which an episode is truncated [s].
             render_mode: None or "rgb_array".
 
