@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from controller.cli.common import ExitCode, Json, ProgressLine, print_json, shown_path, whole
 from controller.cli.motion_args import MOTION_HELP, Settings, the_motion
 from controller.cli.sweep import tell
+from go2_wbc.brief import counted
 from go2_wbc.errors import CommandError
 
 if TYPE_CHECKING:
@@ -66,10 +67,9 @@ def run(
     if json:
         print_json({"file": str(folder), **told})
     else:
-        print(
-            f"{told['rows']} rows, {told['minutes']:.1f} min of robot time, {told['falls']} falls"
-        )
-        print(f"{told['episodes']} episodes in {shown_path(folder)}")
+        print(f"{told['rows']} rows, {told['minutes']:.1f} min of robot time")
+        falls = counted(told["falls"], "fall")
+        print(f"{counted(told['episodes'], 'episode')}, {falls}, in {shown_path(folder)}")
     return ExitCode.OK
 
 
@@ -80,7 +80,7 @@ def _pair(name: str, values: tuple[float, ...]) -> tuple[float, float]:
     return values[0], values[1]
 
 
-def _told(found: Dataset) -> dict[str, float]:
+def _told(found: Dataset) -> dict[str, Any]:
     """What a data set holds, in numbers."""
     falls = {int(seed) for seed in found["seed"][found["fell"]]}
     return {

@@ -18,8 +18,7 @@ def test_a_motion_is_recorded_and_told_of_in_words_or_as_json(
     monkeypatch.chdir(tmp_path)
     words = ("dataset", "bow.parquet", "--task", "bow", "--minutes", 0.04, "--workers", 1)
     told = run(*words)
-    assert "1 episodes in bow.parquet" in told.out
-    assert ", 0 falls" in told.out
+    assert "1 episode, 0 falls, in bow.parquet" in told.out
     assert "1/1" in told.err
     found = read_dataset(tmp_path / "bow.parquet")
     values = json.loads(run(*words, "--json").out)
