@@ -197,6 +197,7 @@ EXTRAS: Mapping[str, str] = {
     "sweep": "sweeps as Parquet files",
     "cluster": "sweeps on many machines",
     "gamepad": "a gamepad for teleop",
+    "learning": "Gymnasium's environments, data sets",
     "mcap": "recordings as MCAP files, for Foxglove",
     "rerun": "recordings as rrd files, for Rerun (490 MB)",
     "examples": "what some examples show their point with",

@@ -23,6 +23,7 @@ NEEDS = {
     "24_motion_in_pytest": "pytest",
     "29_ros2_student_class": "rclpy",
     "30_sport_client": "cyclonedds",
+    "33_learn_with_gymnasium": "gymnasium",
 }
 """What an example needs beside the project."""
 BEHIND = re.compile(r"^(WARNING: )?the loop is \d+ ms behind the wall clock$")
@@ -62,8 +63,13 @@ POINTS = {
     "29_ros2_student_class": ("up: True", "walk: True", "high_five: True", "sit: True"),
     "30_sport_client": ("version: 1", "'STAND_UP': 0, 'BALANCE_STAND': 0"),
     "31_walk_with_my_own_task": (r"0 tasks .* 0\.1\d\d rad/s", r"1 tasks .* rad/s, [345]\d%"),
+    "33_learn_with_gymnasium": (
+        r"26:38 +joint_velocities \[rad/s\]",
+        r"random: 0\.\d s, .* by fall",
+        r"standing: 20\.0 s",
+    ),
     "32_stairs_by_sight": ("at first: <SeenTerrain", r"climbed (4[5-9]|5[01]) cm"),
-    "33_why_this_torque": ("standing: no limit binds", "a weak calf: torque", "contradicts the"),
+    "35_why_this_torque": ("standing: no limit binds", "a weak calf: torque", "contradicts the"),
 }
 """What must be read in the output of each: regular expressions."""
 DEAD_MOTORS = """

@@ -119,15 +119,26 @@ def order_of(function: Callable[[Any], Any]) -> bytes:
 
 
 def answer(order: bytes, item: bytes) -> bytes:
+    """The ``reply``, and nothing of what it took."""
+    try:
+        return reply(order, item)
+    finally:
+        tidy_up()
+
+
+def reply(order: bytes, item: bytes) -> bytes:
     """The message that says what came of an item: the value, or the ``Failure``."""
     try:
         return pickle.dumps((_ordered(order)(pickle.loads(item)), None))
     except (Exception, SystemExit) as error:
         text = traceback.format_exception_only(error)[-1].strip()
         return pickle.dumps((None, Failure(text, _told(error))))
-    finally:  # of what it has left: robots hold tens of megabytes of records, in cycles
-        gc.collect()
-        _keep_the_rest()
+
+
+def tidy_up() -> None:
+    """Free what an item has left: robots hold tens of megabytes of records, in cycles."""
+    gc.collect()
+    _keep_the_rest()
 
 
 def _told(error: BaseException) -> str:
@@ -173,7 +184,8 @@ def serve(pipe: Connection, order: bytes, environment: Mapping[str, str]) -> Non
         random.seed()  # Python's own numbers are seeded anew by a fork
     with suppress(EOFError):
         while True:
-            pipe.send_bytes(answer(order, pipe.recv_bytes()))
+            pipe.send_bytes(reply(order, pipe.recv_bytes()))
+            tidy_up()  # while nobody waits
 
 
 def _end_with_parent() -> None:
@@ -279,6 +291,12 @@ class Worker:
         with suppress(EOFError, OSError):
             if self._pipe.poll():
                 return self._pipe.recv_bytes()
+        return None
+
+    def wait(self) -> bytes | None:
+        """What comes of the item, as soon as it does; None if the worker has ended."""
+        with suppress(EOFError, OSError):
+            return self._pipe.recv_bytes()
         return None
 
     def end(self) -> str:
