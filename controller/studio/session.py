@@ -10,13 +10,14 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import final
 
+import viz
 from controller.studio.edits import PALETTE, edited
 from controller.studio.orders import Answer, Bar, Order, Task
 from controller.studio.project import Project
 from controller.studio.running import Runner
 from controller.studio.source import Source, parameters
 from go2_wbc.curves import Ease
-from go2_wbc.errors import StudioError
+from go2_wbc.errors import Go2WbcError, StudioError, unknown_name
 from go2_wbc.legs import LEGS
 from motions.authoring import Value
 from motions.language.body_and_feet import POSES
@@ -26,6 +27,7 @@ from viz.replay.page_data import content_text
 from viz.replay.preview_server import PreviewServer
 
 HISTORY = ("undo", "redo")
+EXPORTS = ("html", "webp")  #: An offline page, and a film
 WORDS: Mapping[str, Sequence[str]] = {
     "leg": [leg.name for leg in LEGS],
     "ease": [ease.value for ease in Ease],
@@ -72,7 +74,12 @@ class Studio:
                 port,
                 self._choose,
                 token=token,
-                actions={"/edit": self.edit, "/play": self.play, "/mend": self.mend},
+                actions={
+                    "/edit": self.edit,
+                    "/play": self.play,
+                    "/mend": self.mend,
+                    "/export": self.export,
+                },
             )
         except BaseException:
             self._end()
@@ -137,6 +144,28 @@ class Studio:
             return {"error": str(error)}
         self._changes = tuple(call for call, _ in found)
         return {"changes": found}
+
+    def export(self, order: Mapping[str, object]) -> dict[str, object]:
+        """Write what is saved beside the file: ``kind`` is one of ``EXPORTS``.
+
+        A file that is there is written over only ``again``; "exists" asks for that.
+        """
+        kind = order.get("kind")
+        if not isinstance(kind, str) or kind not in EXPORTS:
+            return {"error": unknown_name("kind", str(kind), EXPORTS)}
+        path = self._project.path.with_name(f"{self.motion}.{kind}")
+        if path.exists() and order.get("again") is not True:
+            return {"exists": path.name}
+        try:
+            shown = self._run(self._project.saved)
+            content = replace(self._content(shown), editor=None)
+            if kind == "html":
+                viz.export_html(content, path, title=shown.motion)
+            else:
+                viz.export_animation(content, path, speed=1.0, fps=12.5)
+        except Go2WbcError as error:
+            return {"error": str(error)}
+        return {"told": f"wrote {path.name}"}
 
     def look(self) -> bool:
         """Show what somebody else has saved; whether somebody has."""

@@ -172,6 +172,19 @@ def test_physics_plays_it_beside_the_plan(studio: Studio) -> None:
     assert str(answer["told"]).startswith("played in MuJoCo: done")
 
 
+def test_what_is_exported_lies_beside_the_file(studio: Studio, file: Path) -> None:
+    page = file.with_suffix(".html")
+    assert studio.export({"kind": "html"}) == {"told": "wrote greet.html"}
+    before = page.read_text(encoding="utf-8")
+    assert "class Studio" not in before
+    page.write_text("mine", encoding="utf-8")
+    assert studio.export({"kind": "html"}) == {"exists": "greet.html"}
+    assert page.read_text(encoding="utf-8") == "mine"
+    assert studio.export({"kind": "html", "again": True}) == {"told": "wrote greet.html"}
+    assert page.read_text(encoding="utf-8") == before
+    assert "kind" in str(studio.export({"kind": "../../evil"})["error"])
+
+
 @pytest.mark.slow
 def test_a_file_that_never_ends_is_stopped_and_the_next_one_runs(
     studio: Studio, file: Path, monkeypatch: pytest.MonkeyPatch

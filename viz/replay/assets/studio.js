@@ -72,10 +72,17 @@ class Studio {
       button.addEventListener("click", () => this[name]());
       tools.append(button);
     }
+    const out = element("select", { title: "Write a file beside the motion's" });
+    out.setAttribute("aria-label", "Export");
+    out.append(new Option("Export…", ""), new Option("Offline page", "html"), new Option("Film", "webp"));
+    out.addEventListener("change", () => {
+      if (out.value) this.export(out.value);
+      out.value = "";
+    });
     this.say = element("output", { id: "studio-say" });
     this.say.setAttribute("role", "status");
     this.changes = element("div", { id: "studio-changes", className: "buttons" });
-    tools.append(palette, this.say, this.changes);
+    tools.append(palette, out, this.say, this.changes);
     return tools;
   }
 
@@ -184,15 +191,23 @@ class Studio {
     }));
   }
 
+  async export(kind) {
+    let answer = await this.ask("export", "writing…", { kind });
+    if (answer.exists && window.confirm(`${answer.exists} is there already: write over it?`)) {
+      answer = await this.ask("export", "writing…", { kind, again: true });
+    }
+    this.tell(answer.told ?? answer.error ?? "nothing was written", Boolean(answer.error));
+  }
+
   // An answer that takes seconds; edits go on meanwhile.
-  async ask(what, text) {
-    const button = this.tools.querySelector(`[data-ask=${what}]`);
+  async ask(what, text, order = {}) {
+    const button = this.tools.querySelector(`[data-ask=${what}]`) ?? {};
     button.disabled = true;
     this.tell(text);
     let answer;
     try {
       const headers = { "Content-Type": "application/json" };
-      answer = await (await fetch(`${what}${location.search}`, { method: "POST", headers, body: "{}" })).json();
+      answer = await (await fetch(`${what}${location.search}`, { method: "POST", headers, body: JSON.stringify(order) })).json();
     } catch {
       answer = { error: "The studio has ended." };
     }
