@@ -168,10 +168,10 @@ class Studio:
         return {"told": f"wrote {path.name}"}
 
     def look(self) -> bool:
-        """Show what somebody else has saved; whether somebody has."""
+        """Show what somebody else has saved, once it rests; whether anything is new."""
         with self._lock:
             try:
-                if not self._project.refresh():
+                if not self._project.refresh(must_rest=True):
                     return False
             except StudioError as error:
                 self._server.publish_error(str(error))
