@@ -33,10 +33,10 @@ WORDS: Mapping[str, Sequence[str]] = {
     "ease": [ease.value for ease in Ease],
     "frame": ["ground", "body"],
     "gait": list(STEP_GAITS),
-    "name": list(POSES),
+    "pose.name": list(POSES),
     "joint": ["hip", "thigh", "calf"],
 }
-"""Words that arguments may be; others can be written in the file."""
+"""Words that arguments may be, of all calls or of one; others can be written in the file."""
 
 
 @final
@@ -94,7 +94,8 @@ class Studio:
                 file that the page knows, ``commit`` whether to save.
 
         Returns:
-            What the page shows next, packed; or why nothing was done.
+            What the page shows next, packed, and of what was saved the ``site`` of the call that
+            was changed or made; or why nothing was done.
         """
         with self._lock:
             try:
@@ -111,22 +112,23 @@ class Studio:
             (self._project.undo if op == "undo" else self._project.redo)()
             self.show()
             return {}
-        data = self._edited(order)
+        source = self._edited(order)
+        data, site = source.data, dict[str, object](site=source.site)
         shown = self._run(data)  # what is no motion is not saved
         if order.get("commit") is True:
             self._project.save(data)
             self._server.publish(self._content(shown))
-            return {}
+            return site
         return {"data": content_text(self._content(shown), shown.motion)}
 
-    def _edited(self, order: Mapping[str, object]) -> bytes:
+    def _edited(self, order: Mapping[str, object]) -> Source:
         source = Source(self._project.saved)
         if order.get("op") != "change":
-            return edited(source, order).data
+            return edited(source, order)
         which = order.get("which")
         if type(which) is not int or not 0 <= which < len(self._changes):
             raise StudioError("a change is one of those that were proposed")
-        return source.append(self.motion or "", self._changes[which]).data
+        return source.append(self.motion or "", self._changes[which])
 
     def play(self, _: Mapping[str, object]) -> dict[str, object]:
         """The motion as it is saved, in MuJoCo beside the plan; or why it could not be played."""
