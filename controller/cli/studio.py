@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 import webbrowser
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Annotated
 
@@ -64,7 +65,8 @@ def _file_of(word: str) -> tuple[Path, str | None]:
     path = Path(own)
     if own.endswith(".py"):
         if not path.exists():
-            new(path.stem, out=path.parent)
+            with redirect_stdout(sys.stderr):
+                new(path.stem, out=path.parent)
         return path, name or None
     (motion,) = motions_of(word)
     source = Path(motion.source.rpartition(":")[0])

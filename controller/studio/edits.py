@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from controller.studio.source import Site, Source
+from controller.studio.source import Site, Source, first_parameters
 from go2_wbc.errors import StudioError, unknown_name
 
 
@@ -20,8 +20,12 @@ class Template:
 
     def code(self, source: Source) -> str:
         """It as text of this file."""
-        given = ", ".join(source.argument(name, value) for name, value in self.arguments.items())
-        return f".{self.call}({given})"
+        first, given = first_parameters(self.call), self.arguments.items()
+        texts = [
+            source.value(name, value) if name in first else source.argument(name, value)
+            for name, value in given
+        ]
+        return f".{self.call}({', '.join(texts)})"
 
 
 PALETTE: Mapping[str, Template] = MappingProxyType(

@@ -25,6 +25,7 @@ class Project:
         """Read it; raises StudioError if that cannot be."""
         self.path = path.resolve()
         self.saved = self._read()
+        self._glimpse = self.saved
         self._before: list[bytes] = []
         self._after: list[bytes] = []
 
@@ -38,14 +39,18 @@ class Project:
         """Whether a text was undone."""
         return bool(self._after)
 
-    def refresh(self) -> bool:
+    def refresh(self, *, must_rest: bool = False) -> bool:
         """Take what somebody else has saved; whether somebody has. Their text can be undone, too.
+
+        With ``must_rest`` only once it has stayed the same from one call to the next: a save takes
+        a moment, in which a file may be empty, cut short or away.
 
         Raises:
             StudioError: if the file cannot be read.
         """
         now = self._read()
-        if now == self.saved:
+        has_rested, self._glimpse = now == self._glimpse, now
+        if now == self.saved or (must_rest and not has_rested):
             return False
         self._keep(now)
         return True

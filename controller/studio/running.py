@@ -7,11 +7,13 @@ saved: while a bar is dragged, the text as it would be runs.
 from __future__ import annotations
 
 import multiprocessing
+import os
 import threading
 from typing import cast, final
 
 from controller.studio.orders import Answer, Order
 from controller.studio.working import serve
+from controller.sweeps.engine import ONE_THREAD
 from go2_wbc.errors import StudioError
 
 LONGEST_RUN = 2.0
@@ -31,7 +33,11 @@ class Runner:
         context = multiprocessing.get_context("spawn")
         self._pipe, there = context.Pipe()
         self._process = context.Process(target=serve, args=(there,), daemon=True)
+        before = os.environ.copy()
+        os.environ.update(ONE_THREAD)  # more would wait for each other, busily
         self._process.start()
+        os.environ.clear()
+        os.environ.update(before)
         there.close()
         self._is_warm = False
 

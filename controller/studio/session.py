@@ -10,13 +10,14 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import final
 
+import viz
 from controller.studio.edits import PALETTE, edited
 from controller.studio.orders import Answer, Bar, Order, Task
 from controller.studio.project import Project
 from controller.studio.running import Runner
 from controller.studio.source import Source, parameters
 from go2_wbc.curves import Ease
-from go2_wbc.errors import StudioError
+from go2_wbc.errors import Go2WbcError, StudioError, unknown_name
 from go2_wbc.legs import LEGS
 from motions.authoring import Value
 from motions.language.body_and_feet import POSES
@@ -26,15 +27,16 @@ from viz.replay.page_data import content_text
 from viz.replay.preview_server import PreviewServer
 
 HISTORY = ("undo", "redo")
+EXPORTS = ("html", "webp")  #: An offline page, and a film
 WORDS: Mapping[str, Sequence[str]] = {
     "leg": [leg.name for leg in LEGS],
     "ease": [ease.value for ease in Ease],
     "frame": ["ground", "body"],
     "gait": list(STEP_GAITS),
-    "name": list(POSES),
+    "pose.name": list(POSES),
     "joint": ["hip", "thigh", "calf"],
 }
-"""Words that arguments may be; others can be written in the file."""
+"""Words that arguments may be, of all calls or of one; others can be written in the file."""
 
 
 @final
@@ -72,7 +74,12 @@ class Studio:
                 port,
                 self._choose,
                 token=token,
-                actions={"/edit": self.edit, "/play": self.play, "/mend": self.mend},
+                actions={
+                    "/edit": self.edit,
+                    "/play": self.play,
+                    "/mend": self.mend,
+                    "/export": self.export,
+                },
             )
         except BaseException:
             self._end()
@@ -87,7 +94,8 @@ class Studio:
                 file that the page knows, ``commit`` whether to save.
 
         Returns:
-            What the page shows next, packed; or why nothing was done.
+            What the page shows next, packed, and of what was saved the ``site`` of the call that
+            was changed or made; or why nothing was done.
         """
         with self._lock:
             try:
@@ -104,22 +112,23 @@ class Studio:
             (self._project.undo if op == "undo" else self._project.redo)()
             self.show()
             return {}
-        data = self._edited(order)
+        source = self._edited(order)
+        data, site = source.data, dict[str, object](site=source.site)
         shown = self._run(data)  # what is no motion is not saved
         if order.get("commit") is True:
             self._project.save(data)
             self._server.publish(self._content(shown))
-            return {}
+            return site
         return {"data": content_text(self._content(shown), shown.motion)}
 
-    def _edited(self, order: Mapping[str, object]) -> bytes:
+    def _edited(self, order: Mapping[str, object]) -> Source:
         source = Source(self._project.saved)
         if order.get("op") != "change":
-            return edited(source, order).data
+            return edited(source, order)
         which = order.get("which")
         if type(which) is not int or not 0 <= which < len(self._changes):
             raise StudioError("a change is one of those that were proposed")
-        return source.append(self.motion or "", self._changes[which]).data
+        return source.append(self.motion or "", self._changes[which])
 
     def play(self, _: Mapping[str, object]) -> dict[str, object]:
         """The motion as it is saved, in MuJoCo beside the plan; or why it could not be played."""
@@ -138,11 +147,33 @@ class Studio:
         self._changes = tuple(call for call, _ in found)
         return {"changes": found}
 
+    def export(self, order: Mapping[str, object]) -> dict[str, object]:
+        """Write what is saved beside the file: ``kind`` is one of ``EXPORTS``.
+
+        A file that is there is written over only ``again``; "exists" asks for that.
+        """
+        kind = order.get("kind")
+        if not isinstance(kind, str) or kind not in EXPORTS:
+            return {"error": unknown_name("kind", str(kind), EXPORTS)}
+        path = self._project.path.with_name(f"{self.motion}.{kind}")
+        if path.exists() and order.get("again") is not True:
+            return {"exists": path.name}
+        try:
+            shown = self._run(self._project.saved)
+            content = replace(self._content(shown), editor=None)
+            if kind == "html":
+                viz.export_html(content, path, title=shown.motion)
+            else:
+                viz.export_animation(content, path, speed=1.0, fps=12.5)
+        except Go2WbcError as error:
+            return {"error": str(error)}
+        return {"told": f"wrote {path.name}"}
+
     def look(self) -> bool:
-        """Show what somebody else has saved; whether somebody has."""
+        """Show what somebody else has saved, once it rests; whether anything is new."""
         with self._lock:
             try:
-                if not self._project.refresh():
+                if not self._project.refresh(must_rest=True):
                     return False
             except StudioError as error:
                 self._server.publish_error(str(error))

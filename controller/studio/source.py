@@ -10,6 +10,7 @@ import ast
 import inspect
 import math
 import re
+from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,6 +24,7 @@ Span = tuple[int, int]  #: first byte, and the first after it
 DEGREES = "deg"  #: the function of the language that takes them
 ANGLES = frozenset({"roll", "pitch", "yaw", "angle", "turn"})
 """Arguments that are added in degrees; the joints of a leg stay in radians."""
+LONGEST_LINE = 100  #: characters; an inserted call that would make it longer gets its own line
 _DIGITS = 4  #: decimals that an edit may add
 
 
@@ -45,10 +47,11 @@ class Source:
 
     Attributes:
         data: its bytes.
+        site: of the call that an edit has changed or made; None where it has gone.
     """
 
-    def __init__(self, data: bytes) -> None:
-        """Read it.
+    def __init__(self, data: bytes, end: int | None = None) -> None:
+        """Read it; the call of ``site`` ends before byte ``end``.
 
         Raises:
             StudioError: if it is not Python; says the line.
@@ -62,6 +65,10 @@ class Source:
         bom = 3 if data.startswith(b"\xef\xbb\xbf") else 0
         ends = [match.end() for match in re.finditer(rb"\r\n|\r|\n", data)]
         self._starts = [bom, *ends]
+        self.site: Site | None = None
+        if end is not None:
+            line = bisect_right(self._starts, end)
+            self.site = (line, end - self._starts[line - 1])
 
     def slots(self, site: Site, number: int = 0) -> list[Slot]:
         """The arguments that are written in a call, in order, for the ``number``-th time it runs.
@@ -88,7 +95,10 @@ class Source:
             if slot.name == name:
                 if slot.span is None:
                     raise StudioError(f"{name} is {slot.code}: {slot.why}")
-                return self._replaced(slot.span, written(value, self._text(slot.span)))
+                text = written(value, self._text(slot.span))
+                _, end = self._span(self._call(site))
+                longer = len(text.encode()) - (slot.span[1] - slot.span[0])
+                return self._replaced(slot.span, text, end + longer * (slot.span[0] < end))
         return self._added(site, name, value)
 
     def delete(self, site: Site) -> Source:
@@ -113,9 +123,18 @@ class Source:
         return self._behind(call, (layout[0] if layout else "") + code)
 
     def _behind(self, call: ast.Call, text: str) -> Source:
-        _, end = self._link(call)
-        end = self._tail(end) if text[:1] in "\r\n" else end
-        return self._replaced((end, end), text)
+        """With ``text`` behind a call; as a statement of its own where the line would be long."""
+        (_, end), statement = self._link(call), self._statement(call)
+        if text[:1] in "\r\n":
+            end = self._tail(end)
+        elif isinstance(statement, ast.Assign) and statement.value is call:
+            (start, _), (target,) = self._span(statement), statement.targets
+            first = self._starts[statement.lineno - 1]
+            if isinstance(target, ast.Name) and end - first + len(text) > LONGEST_LINE:
+                break_ = "\r\n" if b"\r\n" in self.data else "\n"
+                text = f"{break_}{self._text((first, start))}{target.id} = {target.id}{text}"
+                end = self._tail(end)
+        return self._replaced((end, end), text, end + len(text.encode()))
 
     def swap(self, site: Site, step: int) -> Source:
         """With a call exchanged for the one before (-1) or after it (1) in its chain."""
@@ -127,8 +146,11 @@ class Source:
         links = sorted([self._link(call), self._link(other)])
         first, second = ((start, self._tail(end)) for start, end in links)
         middle = self._text((first[1], second[0]))
+        (_, one), (_, other_end) = links
+        # Where the two end then, their comments left out.
+        moved = second[1] - (first[1] - one) if step > 0 else first[0] + other_end - second[0]
         return self._replaced(
-            (first[0], second[1]), self._text(second) + middle + self._text(first)
+            (first[0], second[1]), self._text(second) + middle + self._text(first), moved
         )
 
     def append(self, motion: str, code: str) -> Source:
@@ -153,11 +175,15 @@ class Source:
 
     def argument(self, name: str, value: float | str) -> str:
         """An argument as text, such as ``yaw=deg(10.0)``; in radians where ``deg`` is unknown."""
+        return f"{name}={self.value(name, value)}"
+
+    def value(self, name: str, value: float | str) -> str:
+        """The value of an argument of this name as text."""
         if name not in ANGLES or isinstance(value, str):
-            return f"{name}={written(value)}"
+            return written(value)
         if any(isinstance(node, ast.alias) and node.name == DEGREES for node in self._nodes):
-            return f"{name}={DEGREES}({written(value)})"
-        return f"{name}={written(math.radians(value))}"
+            return f"{DEGREES}({written(value)})"
+        return written(math.radians(value))
 
     # --- where things are -----------------------------------------------------------------
 
@@ -218,8 +244,8 @@ class Source:
             node = self._parents[node]
         return node
 
-    def _replaced(self, span: Span, text: str) -> Source:
-        return Source(self.data[: span[0]] + text.encode() + self.data[span[1] :])
+    def _replaced(self, span: Span, text: str, end: int | None = None) -> Source:
+        return Source(self.data[: span[0]] + text.encode() + self.data[span[1] :], end)
 
     def _without_statement(self, statement: ast.stmt) -> Source:
         above = self._parents[statement]
@@ -337,11 +363,17 @@ class Source:
         takes = parameters(self._name(call))
         if name not in takes:
             raise StudioError(f"{self._name(call)}(): {unknown_name('argument', name, takes)}")
-        last = max([self._span(node)[1] for _, node in self._arguments(call)], default=None)
-        if last is not None:
-            return self._replaced((last, last), f", {self.argument(name, value)}")
-        start = self.data.index(b"(", self._name_start(call)) + 1
-        return self._replaced((start, start), self.argument(name, value))
+        at = max([self._span(node)[1] for _, node in self._arguments(call)], default=0)
+        text = f", {self.argument(name, value)}" if at else self.argument(name, value)
+        at = at or self.data.index(b"(", self._name_start(call)) + 1
+        return self._replaced((at, at), text, self._span(call)[1] + len(text.encode()))
+
+
+def first_parameters(name: str) -> list[str]:
+    """Those that are given by their places: the ones that a call needs, if they may be."""
+    given = inspect.signature(getattr(Timeline, name)).parameters.values()
+    needed = (one for one in given if one.default is one.empty)
+    return [one.name for one in needed if one.kind is one.POSITIONAL_OR_KEYWORD]
 
 
 def parameters(name: str) -> list[str]:
@@ -351,17 +383,15 @@ def parameters(name: str) -> list[str]:
 
 
 def written(value: float | str, before: str = "") -> str:
-    """A value as Python text: as many decimals as ``before`` has, or as it needs."""
+    """A value as Python text, in the quotes, or as whole, as ``before``."""
     if isinstance(value, str):
         quote = before[:1] if before[:1] in ("'", '"') else '"'
         if re.fullmatch(r"[\w .-]*", value) is None:
-            raise StudioError(f"{value!r} is not a word")
+            raise StudioError(f"{value!r} is not a word of letters, digits, dots and spaces")
         return f"{quote}{value}{quote}"
     if before and re.fullmatch(r"[-+]?\d+", before) and float(value).is_integer():
         return str(int(value))
-    decimals = len(before.partition(".")[2]) if re.fullmatch(r"[-+]?\d*\.\d+", before) else 1
-    text = f"{value:.{_DIGITS}f}".rstrip("0")
-    return f"{value + 0.0:.{max(decimals, len(text.partition('.')[2]))}f}"
+    return str(round(float(value), _DIGITS) + 0.0)
 
 
 def _value(node: ast.expr) -> float | str | None:

@@ -156,13 +156,17 @@ class PosedRobot:
     """Places the robot's surface in the world."""
 
     def __init__(self, visuals: RobotVisuals) -> None:
-        """Gather the surfaces of each link in the frame of its joint."""
-        self._model = visuals.model
+        self._visuals, self._model = visuals, visuals.model
         self._data = visuals.model.createData()
         self._foot_frames = [visuals.model.getFrameId(name) for name in FOOT_NAMES]
-        self._links = [
-            (item.parentJoint, Surface.joined(visuals.meshes[item.meshPath]).placed(item.placement))
-            for item in visuals.geometry.geometryObjects
+
+    @functools.cached_property
+    def _links(self) -> list[tuple[int, Surface]]:
+        """The surfaces of each link in the frame of its joint; who asks for feet needs none."""
+        meshes = self._visuals.meshes
+        return [
+            (item.parentJoint, Surface.joined(meshes[item.meshPath]).placed(item.placement))
+            for item in self._visuals.geometry.geometryObjects
         ]
 
     def at(self, q: Float[np.ndarray, "19"]) -> Surface:

@@ -51,6 +51,16 @@ def test_what_somebody_else_saved_is_never_written_over(file: Path) -> None:
     assert file.read_bytes() == b"theirs"
 
 
+def test_a_save_that_is_under_way_is_waited_for(file: Path) -> None:
+    project = Project(file)
+    for text in (b"", b"the", b"theirs"):
+        file.write_bytes(text)
+        assert not project.refresh(must_rest=True)
+    assert project.refresh(must_rest=True)
+    project.undo()
+    assert (file.read_bytes(), project.can_undo) == (b"one\r\n", False)
+
+
 def test_a_file_that_cannot_be_written_stays(file: Path) -> None:
     project = Project(file)
     file.chmod(0o444)

@@ -51,13 +51,18 @@ def opened(folder: Path) -> Iterator[Studio]:
 def studio(opened: Studio, folder: Path) -> Studio:
     """With the file as it was at first."""
     (folder / "greet.py").write_text(GREET, encoding="utf-8")
-    opened.look()
+    _look(opened)
     return opened
 
 
 @pytest.fixture
 def file(folder: Path) -> Path:
     return folder / "greet.py"
+
+
+def _look(studio: Studio) -> bool:
+    """What was saved rests from the first look to the second."""
+    return studio.look() or studio.look()
 
 
 def _shown(packed: str) -> dict[str, Any]:
@@ -101,7 +106,8 @@ def test_a_draft_is_shown_and_not_saved(studio: Studio, file: Path) -> None:
 
 
 def test_an_edit_is_saved_shown_and_undone(studio: Studio, file: Path) -> None:
-    assert _edit(studio, 0, op="set", name="over", value=0.9) == {}
+    answer = _edit(studio, 0, op="set", name="over", value=0.9)
+    assert answer == {"site": _editor(studio)["bars"][0]["site"]}
     assert file.read_text(encoding="utf-8") == GREET.replace("(10.0), over=0.6", "(10.0), over=0.9")
     editor = _editor(studio)
     assert editor["bars"][0]["span"][2] == pytest.approx(0.9)
@@ -130,7 +136,7 @@ def test_a_page_that_shows_an_older_text_changes_nothing(studio: Studio, file: P
 
 def test_a_text_that_somebody_breaks_is_told_and_can_be_undone(studio: Studio, file: Path) -> None:
     file.write_text(GREET.replace("return line", "return lines"), encoding="utf-8")
-    assert studio.look()
+    assert _look(studio)
     assert "NameError" in str(studio._server._error)
     assert studio.edit({"op": "undo"}) == {}
     assert file.read_text(encoding="utf-8") == GREET
@@ -139,7 +145,7 @@ def test_a_text_that_somebody_breaks_is_told_and_can_be_undone(studio: Studio, f
 
 def test_a_file_that_is_away_is_told(studio: Studio, file: Path) -> None:
     file.unlink()
-    assert not studio.look()
+    assert not _look(studio)
     assert "cannot read greet.py" in str(studio._server._error)
     assert "cannot read" in _edit(studio, 0, op="delete")["error"]
     assert not file.exists()
@@ -154,12 +160,12 @@ def test_a_chosen_parameter_is_no_edit(studio: Studio, file: Path) -> None:
 
 
 def test_a_motion_that_cannot_be_done_is_made_possible(studio: Studio, file: Path) -> None:
-    assert _edit(studio, 0, op="set", name="pitch", value=40.0) == {}
+    assert "error" not in _edit(studio, 0, op="set", name="pitch", value=40.0)
     changes = studio.mend({})["changes"]
     assert isinstance(changes, tuple)
     call, _ = changes[0]
     assert _edit(studio, 0, op="change", which=7)["error"]
-    assert _edit(studio, 0, op="change", which=0) == {}
+    assert "error" not in _edit(studio, 0, op="change", which=0)
     assert f"return line.home(over=0.6){call}\n" in file.read_text(encoding="utf-8")
     assert _shown(studio._server.data)["verdict"]["ok"]
 
@@ -172,6 +178,19 @@ def test_physics_plays_it_beside_the_plan(studio: Studio) -> None:
     assert str(answer["told"]).startswith("played in MuJoCo: done")
 
 
+def test_what_is_exported_lies_beside_the_file(studio: Studio, file: Path) -> None:
+    page = file.with_suffix(".html")
+    assert studio.export({"kind": "html"}) == {"told": "wrote greet.html"}
+    before = page.read_text(encoding="utf-8")
+    assert "class Studio" not in before
+    page.write_text("mine", encoding="utf-8")
+    assert studio.export({"kind": "html"}) == {"exists": "greet.html"}
+    assert page.read_text(encoding="utf-8") == "mine"
+    assert studio.export({"kind": "html", "again": True}) == {"told": "wrote greet.html"}
+    assert page.read_text(encoding="utf-8") == before
+    assert "kind" in str(studio.export({"kind": "../../evil"})["error"])
+
+
 @pytest.mark.slow
 def test_a_file_that_never_ends_is_stopped_and_the_next_one_runs(
     studio: Studio, file: Path, monkeypatch: pytest.MonkeyPatch
@@ -179,17 +198,17 @@ def test_a_file_that_never_ends_is_stopped_and_the_next_one_runs(
     monkeypatch.setattr(running, "LONGEST_RUN", 0.5)
     endless = GREET.replace("    line = Time", "    while times: pass\n    line = Time")
     file.write_text(endless, encoding="utf-8")
-    studio.look()
+    _look(studio)
     assert "ran for longer than 0.5 s; it was stopped" in str(studio._server._error)
     for text, told in (
         (GREET + "\nimport os\nos._exit(3)\n", "has ended the process"),
         (GREET + "\nimport sys\nsys.exit(3)\n", "the file ends the program"),
     ):
         file.write_text(text, encoding="utf-8")
-        studio.look()
+        _look(studio)
         assert told in str(studio._server._error)
     file.write_text(GREET, encoding="utf-8")
-    studio.look()
+    _look(studio)
     assert studio._server._error is None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -51,15 +52,20 @@ def _site(data: bytes, call: str, number: int = 0) -> Site:
     return [site for mark, site in _sites(data) if mark.call.name == call][number]
 
 
+def _numbers(data: bytes) -> str:
+    """The text as Python reads it: 0.80 is 0.8."""
+    return ast.dump(ast.parse(data))
+
+
 def _changed(before: bytes, after: bytes) -> list[tuple[bytes, bytes]]:
     rows = zip(before.splitlines(keepends=True), after.splitlines(keepends=True), strict=True)
     return [(old, new) for old, new in rows if old != new]
 
 
-def test_a_number_is_replaced_with_as_many_decimals() -> None:
+def test_a_number_is_replaced_where_it_stands() -> None:
     source, site = Source(FILE), _site(FILE, "body")
     ((old, new),) = _changed(FILE, source.set(site, "over", 0.9).data)
-    assert new == old.replace(b"over=0.80", b"over=0.90")
+    assert new == old.replace(b"over=0.80", b"over=0.9")
     ((old, new),) = _changed(FILE, source.set(site, "pitch", 15.5).data)
     assert new == old.replace(b"12.0", b"15.5")
     ((_, new),) = _changed(FILE, source.set(site, "z", -0.045).data)
@@ -133,6 +139,35 @@ def test_a_call_is_made_again_moved_and_followed_by_another() -> None:
         source.swap(_site(FILE, "foot"), -1)
 
 
+def test_an_insert_that_makes_a_line_long_gets_its_own() -> None:
+    data = FILE
+    for _ in range(3):
+        data = Source(data).insert(_site(data, "body", 3), ".home(over=0.25)").data
+    first = b"    line = line.body(yaw=0.0, over=2 * 0.25)"
+    assert data == FILE.replace(first, first + 3 * b".home(over=0.25)")
+    data = Source(data).insert(_site(data, "home", 3), ".hold(0.25)").data
+    assert first + 3 * b".home(over=0.25)" + b"\n    line = line.hold(0.25)\n" in data
+
+
+@pytest.mark.parametrize("op", ["set", "add", "duplicate", "insert", "earlier", "later"])
+def test_an_edit_tells_where_its_call_stands_then(op: str) -> None:
+    source, site = Source(FILE), _site(FILE, "hold")
+    after = {
+        "set": lambda: source.set(site, "seconds", 10.25),
+        "add": lambda: source.set(site, "name", "here"),
+        "duplicate": lambda: source.duplicate(site),
+        "insert": lambda: source.insert(site, ".hold(9.0)"),
+        "earlier": lambda: source.swap(site, -1),
+        "later": lambda: source.swap(site, 1),
+    }[op]()
+    assert after.site is not None
+    line, column = after.site
+    text = after.data.splitlines()[line - 1][:column].strip()
+    new = {"set": b".hold(10.25)", "add": b'.hold(0.4, name="here")', "insert": b".hold(9.0)"}
+    assert text == new.get(op, b".hold(0.4)")
+    assert after.slots(after.site)
+
+
 def test_a_change_is_appended_to_what_is_returned() -> None:
     data = Source(FILE).append("greet", ".scale(0.9)").data
     assert data == FILE.replace(b"line.home(over=0.6)\n", b"line.home(over=0.6).scale(0.9)\n")
@@ -174,7 +209,7 @@ def test_what_is_no_python_says_the_line() -> None:
 
 @pytest.mark.parametrize(
     ("value", "before", "text"),
-    [(0.30000001, "0.25", "0.30"), (2, "1", "2"), (1.5, "1", "1.5"), (-0.0, "0.5", "0.0")],
+    [(0.30000001, "0.25", "0.3"), (2, "1", "2"), (1.5, "1", "1.5"), (-0.0, "0.5", "0.0")],
 )
 def test_numbers_are_written_as_people_do(value: float, before: str, text: str) -> None:
     assert written(value, before) == text
@@ -227,7 +262,9 @@ def test_the_library_can_be_edited_one_line_at_a_time() -> None:
             if isinstance(slot.value, float):
                 site, number = mark.call.site, mark.call.number
                 source = Source(data)
-                assert source.set(site, slot.name, slot.value, number).data == data
+                assert _numbers(source.set(site, slot.name, slot.value, number).data) == _numbers(
+                    data
+                )
                 assert len(_changed(data, source.set(site, slot.name, 0.123, number).data)) == 1
     assert bars > 500
     assert editable / bars > 0.8

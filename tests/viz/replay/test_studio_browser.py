@@ -79,11 +79,14 @@ def test_a_number_is_typed_and_a_broken_limit_is_red(tab: Tab, file: Path) -> No
     tab.page.locator("[data-bar='0']").click()
     field = tab.page.locator("[data-slot=pitch]")
     assert field.input_value() == "10"
-    field.fill("45")
+    view = tab.evaluate("replay.scene.viewer.camera.position.toArray()")
+    field.select_text()
+    field.press_sequentially("41.2")  # digits that choose a view elsewhere
     field.press("Enter")
+    assert tab.evaluate("replay.scene.viewer.camera.position.toArray()") == view
     tab.wait_for("document.querySelector('[data-bar=\"0\"]').classList.contains('broken')")
     _settle(tab)
-    assert "pitch=deg(45.0)" in file.read_text(encoding="utf-8")
+    assert "pitch=deg(41.2)" in file.read_text(encoding="utf-8")
     assert "broken" in tab.text("#badge")
     assert tab.evaluate("replay.time") == pytest.approx(0.6), "the pose it leads to is shown"
     tab.page.locator("[data-ask=mend]").click()
@@ -117,13 +120,26 @@ def test_a_move_is_inserted_and_one_that_is_refused_is_told(tab: Tab, file: Path
     tab.page.get_by_label("Insert a move").select_option("Pause")
     tab.wait_for(f"{SAID} === 'saved'")
     _settle(tab)
-    assert "(10.0), over=0.6).hold(seconds=0.5).home" in file.read_text(encoding="utf-8")
+    assert "(10.0), over=0.6).hold(0.5).home" in file.read_text(encoding="utf-8")
+    assert tab.evaluate("studio.bar().name") == "hold", "what was made is chosen"
     before = file.read_text(encoding="utf-8")
     tab.page.locator("[data-bar='3']").click()
     tab.click("[data-op=delete]")
     tab.wait_for(f"{SAID}.includes('foot FR is not raised')")
     _settle(tab)
     assert file.read_text(encoding="utf-8") == before
+    assert tab.evaluate("studio.selected") == 3, "still that one"
+
+
+def test_a_draft_is_given_up(tab: Tab, file: Path) -> None:
+    tab.page.locator("[data-bar='0']").click()
+    field = tab.page.locator("[data-slot=pitch]")
+    field.select_text()
+    field.press_sequentially("14")
+    tab.wait_for(f"{SAID} === 'not saved yet'")
+    tab.page.keyboard.press("Escape")
+    tab.wait_for("studio.selected === null")
+    assert file.read_text(encoding="utf-8") == GREET
 
 
 def test_what_an_editor_saves_appears(tab: Tab, file: Path) -> None:
@@ -133,7 +149,7 @@ def test_what_an_editor_saves_appears(tab: Tab, file: Path) -> None:
 
 def test_physics_is_shown_beside_the_plan(tab: Tab) -> None:
     tab.click("[data-ask=play]")
-    tab.wait_for(f"{SAID}.startsWith('played in MuJoCo: done')")
+    tab.wait_for("document.getElementById('who').textContent.startsWith('played in MuJoCo: done')")
     assert tab.evaluate("replay.data.ghost !== null && !replay.data.header.is_plan")
     tab.evaluate("replay.play(false)")
 

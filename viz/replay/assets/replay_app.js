@@ -170,6 +170,7 @@ function bindControls(player) {
   const toggles = { c: "follow", o: "orbit", f: "forces", s: "support", p: "paths" };
   window.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.target.matches("input, select, textarea")) return; // they take keys themselves
     const key = event.key.toLowerCase();
     const sign = { arrowleft: -1, arrowright: 1 }[key];
     if (key === " ") player.play(!player.isPlaying);

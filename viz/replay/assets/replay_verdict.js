@@ -60,7 +60,7 @@ class VerdictPanel {
     this.chosen = name;
     for (const { row, curve: { name: own } } of this.sparks) {
       row.classList.toggle("on", own === name);
-      if (own === name) row.scrollIntoView({ block: "nearest" });
+      if (own === name && !document.querySelector(".studio")) row.scrollIntoView({ block: "nearest" });
     }
     document.querySelector("#chosen h2").textContent = name;
     this.large.draws(this.data, curve);

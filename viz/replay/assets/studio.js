@@ -22,9 +22,12 @@ class Studio {
     this.use(player.data.header.editor);
   }
 
-  use(editor) {
+  // Shows what is saved; a call that was just changed or made is chosen.
+  use(editor, site = null) {
     this.editor = editor;
-    if (this.selected !== null && !editor.bars[this.selected]) this.selected = null;
+    const found = editor.bars.findIndex((bar) => site && bar.site[0] === site[0] && bar.site[1] === site[1]);
+    if (found >= 0) this.selected = found;
+    else if (this.selected !== null && !editor.bars[this.selected]) this.selected = null;
     this.redraw();
   }
 
@@ -72,10 +75,17 @@ class Studio {
       button.addEventListener("click", () => this[name]());
       tools.append(button);
     }
+    const out = element("select", { title: "Write a file beside the motion's" });
+    out.setAttribute("aria-label", "Export");
+    out.append(new Option("Export…", ""), new Option("Offline page", "html"), new Option("Film", "webp"));
+    out.addEventListener("change", () => {
+      if (out.value) this.export(out.value);
+      out.value = "";
+    });
     this.say = element("output", { id: "studio-say" });
     this.say.setAttribute("role", "status");
     this.changes = element("div", { id: "studio-changes", className: "buttons" });
-    tools.append(palette, this.say, this.changes);
+    tools.append(palette, out, this.say, this.changes);
     return tools;
   }
 
@@ -95,9 +105,6 @@ class Studio {
     const bar = this.bar();
     if (!isOwn(bar)) return null;
     const { site } = bar;
-    if (op === "delete") this.selected = Math.max(this.selected - 1, 0);
-    if (op === "duplicate" || op === "later") this.selected += 1;
-    if (op === "earlier") this.selected = Math.max(this.selected - 1, 0);
     const step = { earlier: -1, later: 1 }[op];
     return this.send(step ? { op: "swap", site, step } : { op, site }, true);
   }
@@ -107,12 +114,13 @@ class Studio {
     const last = bars.reduce((best, bar, k) => (isOwn(bar) && (best < 0 || bar.span[2] >= bars[best].span[2]) ? k : best), -1);
     const index = isOwn(this.bar()) ? this.selected : last;
     if (index < 0) return;
-    this.selected = index + 1;
     this.send({ op: "insert", site: bars[index].site, title }, true);
   }
 
-  // A number or word for an argument of the chosen call; a draft is shown, but not saved.
+  // A number or word for an argument of the chosen call; a draft is shown, but not saved. Jumps are
+  // solved, which takes up to half a minute: only when they are let go.
   set(bar, name, value, isCommitted) {
+    if (!isCommitted && bar.parts.includes("robot")) return;
     this.send({ op: "set", site: bar.site, number: bar.number, name, value }, isCommitted);
   }
 
@@ -137,7 +145,9 @@ class Studio {
       this.redrawDraft(this.player.data.header.editor);
     }
     this.tell(answer.error ?? (isCommitted ? "saved" : "not saved yet"), Boolean(answer.error));
-    if (answer.error || isCommitted) await this.reload();
+    if (answer.error) this.inspector.forget();
+    if (answer.error || isCommitted) await this.reload(answer.site);
+    if (answer.site && order.op !== "set" && this.selected !== null) this.select(this.selected);
     this.isBusy = false;
     if (this.waiting) {
       const next = this.waiting;
@@ -147,7 +157,7 @@ class Studio {
   }
 
   // What the server shows now: after a save, or instead of a draft that was refused.
-  async reload() {
+  async reload(site) {
     let answer;
     try {
       answer = await fetch(`data${location.search}`);
@@ -155,7 +165,7 @@ class Studio {
       return;
     }
     this.player.use(new ReplayData(await unpack(await answer.text()), this.player.data.scene));
-    this.use(this.player.data.header.editor);
+    this.use(this.player.data.header.editor, site);
   }
 
   // A draft moves bars; their places in the file are those of what is saved.
@@ -169,30 +179,41 @@ class Studio {
     const answer = await this.ask("play", "playing in MuJoCo…");
     if (!answer.data) return;
     this.player.use(new ReplayData(await unpack(answer.data), this.player.data.scene));
-    this.tell(answer.told, answer.told.startsWith("NOT"));
+    this.tell("");
+    document.getElementById("who").prepend(element("b", {
+      textContent: `${answer.told}. `, className: answer.told.startsWith("NOT") ? "bad" : "",
+    }));
     this.player.play(true);
   }
 
   async mend() {
     const { changes } = await this.ask("mend", "looking for changes…");
     if (!changes) return;
-    this.tell(changes.length ? "append one of these:" : "no change of tempo, size or height is enough", !changes.length);
+    this.tell(changes.length ? "one click, and the robot can do it:" : "no change of tempo, size or height is enough", !changes.length);
     this.changes.replaceChildren(...changes.map(([call, meaning], which) => {
-      const button = element("button", { textContent: call, title: meaning });
+      const button = element("button", { textContent: meaning, title: `appends ${call}` });
       button.addEventListener("click", () => this.send({ op: "change", which }, true));
       return button;
     }));
   }
 
+  async export(kind) {
+    let answer = await this.ask("export", "writing…", { kind });
+    if (answer.exists && window.confirm(`${answer.exists} is there already: write over it?`)) {
+      answer = await this.ask("export", "writing…", { kind, again: true });
+    }
+    this.tell(answer.told ?? answer.error ?? "nothing was written", Boolean(answer.error));
+  }
+
   // An answer that takes seconds; edits go on meanwhile.
-  async ask(what, text) {
-    const button = this.tools.querySelector(`[data-ask=${what}]`);
+  async ask(what, text, order = {}) {
+    const button = this.tools.querySelector(`[data-ask=${what}]`) ?? {};
     button.disabled = true;
     this.tell(text);
     let answer;
     try {
       const headers = { "Content-Type": "application/json" };
-      answer = await (await fetch(`${what}${location.search}`, { method: "POST", headers, body: "{}" })).json();
+      answer = await (await fetch(`${what}${location.search}`, { method: "POST", headers, body: JSON.stringify(order) })).json();
     } catch {
       answer = { error: "The studio has ended." };
     }
@@ -208,6 +229,13 @@ class Studio {
 
   onKey(event) {
     if (event.key.toLowerCase() === "b" && !event.ctrlKey && !event.target.matches("input, select")) this.play();
+    if (event.key === "Escape" && this.selected !== null) {
+      this.selected = null;
+      document.activeElement.blur();
+      if (this.say.textContent === "not saved yet") this.tell("as it is saved");
+      this.inspector.forget();
+      this.reload();
+    }
     if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z") return;
     if (event.target.matches("input")) return; // of the field itself
     event.preventDefault();
@@ -220,9 +248,12 @@ function isOwn(bar) {
   return Boolean(bar) && bar.site[0] > 0;
 }
 
-// The argument that says how long a call lasts.
+// The argument that says how long a call lasts; of a walk without one, what it would say.
 function lengthOf(bar) {
-  return bar.slots.find(({ name, span }) => span && ["over", "seconds"].includes(name));
+  const slot = bar.slots.find(({ name }) => ["over", "seconds"].includes(name));
+  if (slot) return slot.span ? slot : null;
+  const takes = bar.more.includes("over") && !bar.parts.includes("robot");
+  return takes ? { name: "over", value: bar.span[2] - bar.span[1] } : null;
 }
 
 function element(kind, properties = {}) {

@@ -29,6 +29,11 @@ class Inspector {
     return null;
   }
 
+  // The next call is shown anew, whatever is typed into.
+  forget() {
+    this.shape = "";
+  }
+
   // Other values in the same fields; the one that is typed into stays.
   refresh(bar) {
     this.bar = bar;
@@ -46,20 +51,21 @@ class Inspector {
       row.append(element("code", { textContent: slot.code, title: slot.why }), element("small", { textContent: "computed" }));
       return row;
     }
-    const words = typeof slot.value === "string" ? editor.words[slot.name] ?? [slot.value] : null;
+    const isWord = typeof slot.value === "string";
+    const words = isWord ? editor.words[`${bar.name}.${slot.name}`] ?? editor.words[slot.name] : null;
     const input = element(words ? "select" : "input");
     if (words) input.append(...[...new Set([...words, slot.value])].map((word) => new Option(word)));
-    else Object.assign(input, { type: "number", step: stepOf(slot) });
+    else Object.assign(input, isWord ? { type: "text" } : { type: "number", step: stepOf(slot) });
     input.value = slot.value;
     input.dataset.slot = slot.name;
-    const value = () => (words ? input.value : input.valueAsNumber);
+    const value = () => (isWord ? input.value : input.valueAsNumber);
     const send = (isCommitted) => {
       clearTimeout(this.resting);
-      if (words || Number.isFinite(value())) this.studio.set(this.bar, slot.name, value(), isCommitted);
+      if (isWord || Number.isFinite(value())) this.studio.set(this.bar, slot.name, value(), isCommitted);
     };
     input.addEventListener("input", () => {
       clearTimeout(this.resting);
-      if (!words) this.resting = setTimeout(() => send(false), DRAFT_REST);
+      if (!isWord) this.resting = setTimeout(() => send(false), DRAFT_REST);
     });
     input.addEventListener("change", () => send(true));
     const note = slot.place ? `${unitOf(slot, timeUnit)} · ${slot.place}` : unitOf(slot, timeUnit);
@@ -73,14 +79,14 @@ class Inspector {
     select.append(new Option("Add an argument…", ""), ...bar.more.map((name) => new Option(readable(name), name)));
     select.addEventListener("change", () => {
       const name = select.value;
-      if (name) this.studio.set(bar, name, firstValue(name, editor), true);
+      if (name) this.studio.set(bar, name, firstValue(bar, name, editor), true);
     });
     return select;
   }
 }
 
 function shapeOf(bar) {
-  return JSON.stringify([bar.name, bar.site, bar.slots.map(({ name }) => name)]);
+  return JSON.stringify([bar.name, bar.number, bar.runs, bar.slots.map(({ name, span }) => [name, Boolean(span)])]);
 }
 
 function stepOf({ name, is_angle: isAngle }) {
@@ -88,17 +94,19 @@ function stepOf({ name, is_angle: isAngle }) {
   return LENGTHS.includes(name) ? 0.005 : 0.05;
 }
 
-function unitOf({ name, value, is_angle: isAngle }, timeUnit) {
+function unitOf({ name, is_angle: isAngle }, timeUnit) {
   if (isAngle) return "°";
   if (LENGTHS.includes(name)) return "m";
   if (["over", "seconds", "t", "shift_time", "flight"].includes(name)) return timeUnit;
   if (["roll", "pitch", "yaw", "angle", "turn", "hip", "thigh", "calf"].includes(name)) return "rad";
-  return typeof value === "number" ? "" : "word";
+  return "";
 }
 
 // What an argument is at first when it is added; angles in degrees.
-function firstValue(name, editor) {
-  if (editor.words[name]) return editor.words[name][0];
+function firstValue(bar, name, editor) {
+  const words = editor.words[`${bar.name}.${name}`] ?? editor.words[name];
+  if (words) return words[0];
+  if (name === "name") return "here";
   if (["roll", "pitch", "yaw", "angle", "turn"].includes(name)) return 5;
   return LENGTHS.includes(name) ? 0.02 : 0.5;
 }

@@ -27,7 +27,7 @@ class Tracks {
     if (!own.length) return null;
     const row = document.createElement("div");
     row.className = "lane";
-    row.append(element("span", { textContent: lane === "trunk" ? "body" : lane }));
+    row.append(element("span", { textContent: { trunk: "body", robot: "all" }[lane] ?? lane }));
     const rows = []; // when the last bar of each row ends: bars at once lie below each other
     const strip = element("div");
     for (const { bar, index } of own) {
@@ -49,11 +49,11 @@ class Tracks {
     button.classList.toggle("broken", Boolean(bar.broken));
     button.classList.toggle("foreign", !isOwn(bar));
     button.style.setProperty("--row", row);
-    const again = bar.runs > 1 ? ` ×${bar.runs}` : "";
+    const again = bar.runs > 1 ? ` ${bar.number + 1}/${bar.runs}` : "";
     button.append(element("i"), element("span", { textContent: summary(bar) + again }));
     this.place(button, bar.span);
     const where = isOwn(bar) ? `line ${bar.site[0]}` : "in another file";
-    button.title = [`${summary(bar)}, ${where}${again ? `, runs ${bar.runs} times` : ""}`, bar.broken].filter(Boolean).join("\n");
+    button.title = [`${summary(bar)}, ${where}${again ? `, runs ${bar.runs} times` : ""}`, bar.span[1] > bar.span[0] + 0.01 ? "hatched: the trunk shifts over the feet that stay" : "", bar.broken].filter(Boolean).join("\n");
     button.setAttribute("aria-label", button.title);
     if (isOwn(bar) && lengthOf(bar)) button.append(element("em"));
     button.addEventListener("click", () => this.studio.select(index));
@@ -63,7 +63,7 @@ class Tracks {
   }
 
   place(button, [start, move, end]) {
-    const all = this.data.duration;
+    const all = (this.dragged ? this.held : this.data).duration;
     button.style.left = `${100 * start / all}%`;
     button.style.width = `${Math.max(100 * (end - start) / all, LEAST_BAR)}%`;
     button.querySelector("i").style.width = `${100 * (move - start) / Math.max(end - start, 1e-6)}%`; // the shift before it
@@ -82,17 +82,18 @@ class Tracks {
       offset = now.clientX - from;
       if (Math.abs(offset) < 3 && !this.dragged) return;
       this.dragged = { button, index, isEdge };
+      button.classList.add("on");
       if (!isEdge) {
         button.style.transform = `translateX(${offset}px)`;
         return;
       }
       const width = button.parentElement.clientWidth;
-      const end = this.snapped(bar.span[2] + offset / width * this.data0.duration, width);
+      const end = this.snapped(bar.span[2] + offset / width * this.held.duration, width);
       value = durationFor(bar, end);
       this.place(button, [bar.span[0], bar.span[1], bar.span[1] + value / ratio(bar)]);
       this.studio.set(bar, lengthOf(bar).name, value, false);
     };
-    this.data0 = this.data;
+    this.held = this.data;
     const drop = () => {
       button.removeEventListener("pointermove", move);
       button.style.transform = "";
