@@ -115,7 +115,7 @@ class BindingLimit:
 
     @property
     def slack(self) -> float:
-        """Distance from the limit [unit]: rounding."""
+        """Distance from the limit, which is rounding."""
         return abs(self.limit - self.value)
 
     @property
