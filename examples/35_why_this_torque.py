@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from controller import GO2Controller
-from go2_wbc import MujocoPlant, RobotModel, WholeBodyController
+from go2_wbc import Explanation, MujocoPlant, RobotModel, WholeBodyController
 from go2_wbc.reference import Anchor
-from go2_wbc.wbc.explanation import Explanation
 from motions import Timeline, compile_timeline
 
 plant, said = MujocoPlant(), list[Explanation]()

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from go2_wbc.robot.state import JointCommand, RobotState, Snapshot
     from go2_wbc.wbc.config import WbcConfig
     from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
+    from go2_wbc.wbc.explanation import Explanation
     from go2_wbc.wbc.tasks import Task
     from go2_wbc.world import World
 
@@ -34,6 +35,7 @@ __all__ = [
     "LEGS",
     "Config",
     "ContactSchedule",
+    "Explanation",
     "Gait",
     "Go2WbcError",
     "JointCommand",

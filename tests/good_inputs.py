@@ -114,6 +114,7 @@ MADE_INSIDE = {
     *("OdometryCovariance", "Anchor", "BodyTarget", "of_feet", "of_deviations", "Rows", "Bounds"),
     *("Problem", "ResidualRow", "BuiltIn", "Curve", "PosturePlan", "Health", "PartFault"),
     *("RobotDescription", "RobotProfile", "MotorModel", "named", "Series", "Departure", "Source"),
+    *("Explanation", "BindingLimit", "Gain", "Contradiction", "Demand", "Multipliers", "Limit"),
     *(
         "Key",
         "OwnEase",

@@ -220,7 +220,7 @@ class Workspace(Record):
     C: Float[np.ndarray, "44 12"]  #: lower <= C u <= upper are the inequalities
     lower: Float[np.ndarray, "44"]
     upper: Float[np.ndarray, "44"]
-    y: Float[np.ndarray, "44"]  #: their multipliers
+    row_multipliers: Float[np.ndarray, "44"]  #: of the inequalities, row by row
 
 
 @subroutine
@@ -369,18 +369,18 @@ def bound_unknowns(target: Target, limits: Limits, w: Workspace) -> int:
 @subroutine
 def solve_bounded(target: Target, w: Workspace, multipliers: Multipliers) -> int:
     """Move u from the minimum without bounds to that within all; returns the outcome."""
-    m = bound_unknowns(target, w.limits, w)
+    m, y = bound_unknowns(target, w.limits, w), w.row_multipliers
     E, e = np.empty((0, 12)), np.empty(0)
-    outcome = constrain(w.L, E, e, w.C[:m], w.lower[:m], w.upper[:m], w.u, w.y[:m])
+    outcome = constrain(w.L, E, e, w.C[:m], w.lower[:m], w.upper[:m], w.u, y[:m])
     count = 0
     for leg in range(4):
         if target.legs[leg] != STANCE:
             continue
         for n in range(5):
-            multipliers.forces[leg, n] = w.y[count]
+            multipliers.forces[leg, n] = y[count]
             count += 1
     for n in range(12):
-        multipliers.torques[n], multipliers.joints[n] = w.y[count + n], w.y[count + 12 + n]
+        multipliers.torques[n], multipliers.joints[n] = y[count + n], y[count + 12 + n]
     return outcome
 
 

@@ -48,7 +48,7 @@ from go2_wbc.wbc.limit_rows import (
 from go2_wbc.wbc.problem import SIZE, Problem
 from go2_wbc.wbc.solvers import LIMITS, relaxed_qp, solve_with_multipliers, unknowns
 
-MOTOR_TORQUE = 23.7  #: Scale of torques [N m]: of a hip's or a thigh's motor
+MOTOR_TORQUE = 23.7  #: Scale of torques [N m], what a motor of hip or thigh gives
 _TINY = 1e-7  # of a multiplier of (1), times its scale
 _TRIFLES = {"m/s^2": 0.01, "N": 0.1, "N m": 0.01, "rad/s^2": 0.1}  # of what gave way
 

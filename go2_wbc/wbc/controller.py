@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -49,7 +49,7 @@ GREATEST_EXTRA_WEIGHT = 1e4
 BACKENDS = ("condensed", "full", "placo")  #: Names of the back ends, the usual one first
 _IN_BODY = frozenset(BodyTarget.__dataclass_fields__)
 _IN_STATE = ("q", "v")
-_Z, _TAU, _MOTORS, _MULTIPLIERS = map(layout_of(Decision).slice, Decision.part_names())
+_TAU, _MOTORS, _MULTIPLIERS = map(layout_of(Decision).slice, Decision.part_names()[1:])
 _NO_ROWS, _DECISION = np.empty((0, SIZE + 2)), layout_of(Decision).size
 
 
@@ -71,9 +71,8 @@ class WbcSolution:
     solve_time: float
     backend: str
     _formulate: Callable[[], Problem]
-    _z: Array30
+    _row: Float[np.ndarray, " size"]  # z; of the compiled solve all of its ``Decision``
     is_relaxed: bool = False
-    _row: Float[np.ndarray, " size"] | None = field(default=None, repr=False)
 
     __repr__ = brief
 
@@ -85,8 +84,7 @@ class WbcSolution:
         formulate: Callable[[], Problem],
     ) -> WbcSolution:
         """The solution whose arrays ``row`` holds (see ``condensed.Decision``)."""
-        z = row[_Z]
-        return WbcSolution(row[_TAU], row[_MOTORS], solve_time, backend, formulate, z, False, row)
+        return WbcSolution(row[_TAU], row[_MOTORS], solve_time, backend, formulate, row)
 
     @staticmethod
     def from_decision(
@@ -104,29 +102,29 @@ class WbcSolution:
         Pinocchio's spatial base acceleration in the base frame [m/s^2, rad/s^2], then the joints
         [rad/s^2].
         """
-        return self._z[ACCELERATION]
+        return self._row[ACCELERATION]
 
     @property
     def forces(self) -> Array4x3:
         """Contact force [N] of each foot in the world frame; zero for legs in the air."""
-        return self._z[FORCES].reshape(4, 3)
+        return self._row[FORCES].reshape(4, 3)
 
     @property
     def residuals(self) -> tuple[ResidualRow, ...]:
         """Error of every task and violation of every constraint, in its own unit."""
-        return self._formulate().residuals(self._z)
+        return self._formulate().residuals(self._row[:SIZE])
 
     @property
     def violations(self) -> tuple[ResidualRow, ...]:
         """By how much each constraint is broken, in its own unit; rounding, unless relaxed."""
         problem = self._formulate()
         constraints = len(problem.sources) - sum(isinstance(s, Task) for s in problem.sources)
-        return problem.residuals(self._z)[-constraints:]
+        return problem.residuals(self._row[:SIZE])[-constraints:]
 
     @property
     def multipliers(self) -> Multipliers:
         """Of every inequality: written by the compiled solve, else solved for (``explanation``)."""
-        if self._row is not None:
+        if len(self._row) > SIZE:
             return Multipliers.of(self._row[_MULTIPLIERS])
         return multipliers_of(self._formulate(), is_relaxed=self.is_relaxed)
 

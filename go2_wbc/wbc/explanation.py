@@ -115,7 +115,7 @@ class BindingLimit:
 
     @property
     def slack(self) -> float:
-        """Distance from the limit [unit]: rounding."""
+        """Distance from the limit, which is rounding."""
         return abs(self.limit - self.value)
 
     @property
@@ -285,6 +285,8 @@ def _told(
     problem, r = solved.problem, solved.residuals
     dr = limit.per_row * problem.tasks.A[:, unknowns(problem)] @ du
     gains = -problem.weights * r * dr
+    if gains.sum() < 0.0:  # a contact that would better stop its foot faster
+        gains, du, dy, side = -gains, -du, -dy, "upper"
     best = int(np.argmax(gains))
     what, unit = task_labels(problem)[best]
     gain = Gain(what, abs(float(dr[best])), abs(float(r[best])), unit)

@@ -22,7 +22,7 @@ from go2_wbc.wbc.backends import dense_qp, eliminate_equalities, solve_condensed
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.constraints import JointLimits
 from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
-from go2_wbc.wbc.explanation import BindingLimit, Explanation, task_labels
+from go2_wbc.wbc.explanation import HASTY, BindingLimit, Explanation, _ranked, task_labels
 from go2_wbc.wbc.limit_rows import places_of
 from go2_wbc.wbc.problem import SIZE, Problem, Rows
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
@@ -34,6 +34,7 @@ from tests.go2_wbc.wbc.situations import (
     MODEL,
     PLAIN,
     Situation,
+    contact_in_the_air,
     end_of_joint,
     force_cap,
     least_force,
@@ -269,6 +270,8 @@ def test_a_contradiction_says_what_would_do_and_what_gave_way() -> None:
     found = [(one, one.wbc.explain(one.snapshot, one.reference)) for one in many]
     infeasible = [(one, told.contradiction) for one, told in found if told.contradiction]
     assert len(infeasible) > 2
+    named = sum(contradiction.name in one.causes for one, contradiction in infeasible)
+    assert named >= len(infeasible) - 1
     for situation, contradiction in infeasible:
         (cause,) = situation.causes
         cures = [d for d in (contradiction.demand, *contradiction.others) if d is not None]
@@ -302,6 +305,29 @@ def test_a_least_force_above_the_greatest_is_explained_though_nothing_can_be_fol
     assert found.contradiction is not None
     assert found.contradiction.against == "least normal force of FR"
     assert found.contradiction.gave_way == ()
+
+
+def test_a_foot_that_shall_stand_though_it_flies_is_a_limit() -> None:
+    made = situations(contact_in_the_air, 12, seed=47)
+    told = [one.wbc.explain(one.snapshot, one.reference) for one in made]
+    feasible = [(one, why) for one, why in zip(made, told, strict=True) if why.binding]
+    assert len(feasible) > 5
+    for situation, why in feasible:
+        contact = next(limit for limit in why.binding if limit.name in situation.causes)
+        assert contact.unit == "m/s^2"
+        assert contact.limit > HASTY
+        assert 0.0 < contact.cost <= why.cost
+    assert sum(why.first in one.causes for one, why in feasible) >= len(feasible) - 1
+
+
+def test_of_limits_that_cost_about_as_much_the_most_unusual_comes_first() -> None:
+    (situation,) = situations(weak_motor, 1, seed=46)
+    limit = situation.wbc.explain(situation.snapshot, situation.reference).binding[0]
+    costs = {"dearest": 10.0, "alike": 6.0, "odd": 5.5, "cheap": 4.0, "cheaper": 3.0}
+    odd = {"alike": 0.1, "odd": 2.0, "cheaper": 9.0}
+    found = [(replace(limit, name=n, cost=c), odd.get(n, 0.0)) for n, c in costs.items()]
+    told = [one.name for one, _ in _ranked(found)]
+    assert told == ["odd", "alike", "dearest", "cheap", "cheaper"]
 
 
 def test_an_explanation_is_one_line_and_a_table() -> None:
