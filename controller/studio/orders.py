@@ -29,7 +29,7 @@ class Order:
 
     path: Path  #: of the file
     data: bytes  #: that it holds or would hold
-    motion: str | None  #: which of its motions; None for its only one
+    chosen: str | None  #: which of its motions; None for the first
     values: Mapping[str, Value]  #: chosen parameters
     task: Task = Task.CHECK  #: what is done with it
 
@@ -52,7 +52,7 @@ class Bar:
 class Answer:
     """What came of an order."""
 
-    motion: str  #: name of the motion
+    title: str  #: name of the motion
     content: ReplayContent | None = None  #: the plan with its verdict, and how it was played
     bars: tuple[Bar, ...] = ()  #: by their starts
     told: str = ""  #: how playing went, in words

@@ -66,11 +66,11 @@ class Studio:
         self._changes: tuple[str, ...] = ()
         try:
             shown = self._run(self._project.saved)
-            self.motion = shown.motion
+            self.motion = shown.title
             token = secrets.token_urlsafe(16)
             self._server = PreviewServer(
                 self._content(shown),
-                shown.motion,
+                shown.title,
                 port,
                 self._choose,
                 token=token,
@@ -119,7 +119,7 @@ class Studio:
             self._project.save(data)
             self._server.publish(self._content(shown))
             return site
-        return {"data": content_text(self._content(shown), shown.motion)}
+        return {"data": content_text(self._content(shown), shown.title)}
 
     def _edited(self, order: Mapping[str, object]) -> Source:
         source = Source(self._project.saved)
@@ -136,7 +136,7 @@ class Studio:
             shown = self._run(self._project.saved, Task.PLAY)
         except StudioError as error:
             return {"error": str(error)}
-        return {"data": content_text(self._content(shown), shown.motion), "told": shown.told}
+        return {"data": content_text(self._content(shown), shown.title), "told": shown.told}
 
     def mend(self, _: Mapping[str, object]) -> dict[str, object]:
         """What would make the motion possible, as it is saved; taken by ``op`` "change"."""
@@ -162,7 +162,7 @@ class Studio:
             shown = self._run(self._project.saved)
             content = replace(self._content(shown), editor=None)
             if kind == "html":
-                viz.export_html(content, path, title=shown.motion)
+                viz.export_html(content, path, title=shown.title)
             else:
                 viz.export_animation(content, path, speed=1.0, fps=12.5)
         except Go2WbcError as error:

@@ -43,7 +43,7 @@ def _answer(order: Order, checker: FeasibilityChecker, pipe: Connection) -> Answ
     try:
         with traced():
             own = load_text(order.path, order.data)
-            motion = own.get(order.motion or "", next(iter(own.values())))
+            motion = own.get(order.chosen or "", next(iter(own.values())))
             known = {item.name: item for item in motion.parameters}
             values = {name: value for name, value in order.values.items() if name in known}
             line, marks = separated(motion(**values))
