@@ -384,4 +384,6 @@ def _label(
         if start <= time < end:
             return name
     raised = [leg.name for leg in LEGS if not stance[leg]]
+    if len(raised) == 4:
+        return "flight"
     return f"{' and '.join(raised)} up" if raised else "on four feet"
