@@ -32,8 +32,13 @@ class Share:
         self._environments: list[Go2Env] = []
         self._are_over = [False] * count
 
-    def __call__(self, asked: tuple[str, Any]) -> list[Any]:
-        """What each gives for ("reset", seeds and options), ("step", actions) or ("render", None).
+    def __call__(self, asked: tuple[str, Any]) -> Any:  # noqa: ANN401
+        """What they give.
+
+        Args:
+            asked: ("step", actions) gives a row of numbers for each, see ``_row``, and what those
+                tell by number that are reset instead; ("reset", seeds and options) and ("render",
+                None) what ``Go2Env`` gives, one after the other.
 
         Raises:
             CommandError: as ``Go2Env``.
@@ -44,21 +49,36 @@ class Share:
         if what == "render":
             return [environment.render() for environment in self._environments]
         if what == "step":
-            return [self._step(number, action) for number, action in enumerate(given)]
+            told: dict[int, Info] = {}
+            rows = [self._step(number, action, told) for number, action in enumerate(given)]
+            return np.array(rows), told
         seeds, options = given
         self._are_over = [False] * self._count
         pairs = zip(self._environments, seeds, strict=True)
         return [environment.reset(seed=seed, options=options) for environment, seed in pairs]
 
-    def _step(self, number: int, action: Float32[np.ndarray, "12"]) -> Step:
+    def _step(
+        self, number: int, action: Float32[np.ndarray, "12"], told: dict[int, Info]
+    ) -> Float[np.ndarray, " k"]:
         environment = self._environments[number]
         if self._are_over[number]:
             self._are_over[number] = False
-            seen, info = environment.reset()
-            return seen, 0.0, False, False, info
+            seen, told[number] = environment.reset()
+            gains = dict.fromkeys(environment.task.weights, 0.0)
+            return _row((seen, 0.0, False, False, {**told[number], "reward_terms": gains}))
         step = environment.step(action)
         self._are_over[number] = step[2] or step[3]
-        return step
+        return _row(step)
+
+
+def _row(step: Step) -> Float[np.ndarray, " k"]:
+    """A step as numbers: reward, is over, is cut, command, terms of the reward, observation.
+
+    Quicker to send than a tuple with dictionaries, and to put together with others.
+    """
+    seen, reward, is_over, is_cut, info = step
+    gains = info["reward_terms"].values()
+    return np.concatenate([[reward, is_over, is_cut, *info["command"], *gains], seen])
 
 
 class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
@@ -96,6 +116,7 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
         one = Go2Env(**settings)
         one.close()
         self.num_envs, self.render_mode = num_envs, one.render_mode
+        self._size, self._terms = one.layout.size, [*one.task.weights]
         self.single_observation_space, self.single_action_space = (
             one.observation_space,
             one.action_space,
@@ -128,8 +149,11 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
         if len(seeds) != self.num_envs:
             raise CommandError(f"{self.num_envs} environments want as many seeds, got {len(seeds)}")
         parts = [([seeds[number] for number in part], options) for part in self._shares]
-        given = self._asked("reset", parts)
-        return np.array([seen for seen, _ in given]), self._joined([info for _, info in given])
+        given = [one for part in self._asked("reset", parts) for one in part]
+        info: Info = {}
+        for number, (_, own) in enumerate(given):
+            info = self._add_info(info, own, number)
+        return np.array([seen for seen, _ in given]), info
 
     def step(self, actions: np.ndarray) -> tuple[Rows, Float[np.ndarray, " _"], Flags, Flags, Info]:
         """A step of each; see ``Go2Env.step``.
@@ -142,20 +166,26 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
         if actions.shape != (self.num_envs, 12):
             raise CommandError(f"actions must be ({self.num_envs}, 12), got {actions.shape}")
         given = self._asked("step", [actions[part] for part in self._shares])
-        seen, rewards, ends, cuts, infos = zip(*given, strict=True)
-        return (
-            np.array(seen),
-            np.array(rewards),
-            np.array(ends),
-            np.array(cuts),
-            self._joined(infos),
-        )
+        rows = np.concatenate([rows for rows, _ in given])
+        seen = rows[:, -self._size :].astype(np.float32)
+        ends, cuts = rows[:, 1] > 0.0, rows[:, 2] > 0.0
+        info = self._info(rows)
+        told = {
+            int(part[number]): own
+            for part, (_, infos) in zip(self._shares, given, strict=True)
+            for number, own in infos.items()
+        }
+        for number, own in told.items():  # those that were reset instead
+            info["_reward_terms"][number] = False
+            info = self._add_info(info, own, number)
+        return seen, rows[:, 0].copy(), ends, cuts, info
 
     def render(self) -> tuple[UInt8[np.ndarray, "h w 3"], ...] | None:
         """A picture of each, if ``render_mode`` asks for it."""
         if self.render_mode is None:
             return None
-        return tuple(self._asked("render", [None] * len(self._shares)))
+        given = self._asked("render", [None] * len(self._shares))
+        return tuple(picture for part in given for picture in part)
 
     def close_extras(self, **_: object) -> None:
         """End the processes."""
@@ -163,27 +193,27 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
             worker.end()
 
     def _asked(self, what: str, parts: Sequence[object]) -> list[Any]:
-        """What all environments give, each share at the same time."""
+        """What each share gives, all at the same time."""
         for worker, part in zip(self._workers, parts[:-1], strict=True):
             worker.give(pickle.dumps((what, part)))
         own = self._own((what, parts[-1]))
-        return [*(one for worker in self._workers for one in _answered(worker)), *own]
+        return [*map(_answered, self._workers), own]
 
-    def _joined(self, infos: Sequence[Info]) -> Info:
-        """One ``info`` of all, as Gymnasium has it; quickly, unless one has just been reset."""
-        joined: Info = {}
-        if not all("reward_terms" in info for info in infos):
-            for number, info in enumerate(infos):
-                joined = self._add_info(joined, info, number)
-            return joined
-        have, gains = np.ones(self.num_envs, dtype=bool), [info["reward_terms"] for info in infos]
-        terms: Info = {name: np.array([gain[name] for gain in gains]) for name in gains[0]}
-        terms |= {f"_{name}": have for name in gains[0]}
-        command = np.array([info["command"] for info in infos])
-        return {"reward_terms": terms, "_reward_terms": have, "command": command, "_command": have}
+    def _info(self, rows: Float[np.ndarray, "n k"]) -> Info:
+        """What Gymnasium's ``_add_info`` would make of the ``info`` of all."""
+        have = np.ones(self.num_envs, dtype=bool)
+        terms: Info = {name: rows[:, n].copy() for n, name in enumerate(self._terms, 6)}
+        terms |= {f"_{name}": have for name in self._terms}
+        command = rows[:, 3:6].copy()
+        return {
+            "reward_terms": terms,
+            "_reward_terms": have,
+            "command": command,
+            "_command": np.ones(self.num_envs, dtype=bool),
+        }
 
 
-def _answered(worker: Worker) -> list[Any]:
+def _answered(worker: Worker) -> Any:  # noqa: ANN401
     answer = worker.wait()
     if answer is None:
         raise SweepError("a worker of the environments has died: make them anew")

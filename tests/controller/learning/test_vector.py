@@ -36,6 +36,10 @@ def test_each_gives_what_it_gives_alone_and_is_reset_by_the_step_after_its_end()
                 for name, gain in info["reward_terms"].items():
                     assert infos["reward_terms"][name][number] == gain
                 assert np.array_equal(infos["command"][number], info["command"])
+            steps = infos["_reward_terms"][number], infos["reward_terms"]["_turn"][number]
+            assert steps == (step != 5, step != 5)
+            assert infos["_command"][number]
+            assert ("_world" in infos) == (step == 5)
             assert np.array_equal(seen[number], own)
             assert (rewards[number], ends[number], cuts[number]) == tuple(expected)
         assert cuts.all() == (step == 4)
