@@ -36,7 +36,7 @@ class Share:
         """What they give.
 
         Args:
-            asked: ("step", actions) gives a row of numbers for each, see ``_row``, and what those
+            asked: ("step", actions) gives rows of numbers, see ``_row``, and what those
                 tell by number that are reset instead; ("reset", seeds and options) and ("render",
                 None) what ``Go2Env`` gives, one after the other.
 
@@ -50,8 +50,9 @@ class Share:
             return [environment.render() for environment in self._environments]
         if what == "step":
             told: dict[int, Info] = {}
-            rows = [self._step(number, action, told) for number, action in enumerate(given)]
-            return np.array(rows), told
+            actions = np.frombuffer(given, dtype=np.float32).reshape(-1, 12)
+            rows = [self._step(number, action, told) for number, action in enumerate(actions)]
+            return np.array(rows).tobytes(), told
         seeds, options = given
         self._are_over = [False] * self._count
         pairs = zip(self._environments, seeds, strict=True)
@@ -165,20 +166,17 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
         actions = np.asarray(actions, dtype=np.float32)
         if actions.shape != (self.num_envs, 12):
             raise CommandError(f"actions must be ({self.num_envs}, 12), got {actions.shape}")
-        given = self._asked("step", [actions[part] for part in self._shares])
-        rows = np.concatenate([rows for rows, _ in given])
-        seen = rows[:, -self._size :].astype(np.float32)
-        ends, cuts = rows[:, 1] > 0.0, rows[:, 2] > 0.0
-        info = self._info(rows)
-        told = {
-            int(part[number]): own
-            for part, (_, infos) in zip(self._shares, given, strict=True)
-            for number, own in infos.items()
-        }
-        for number, own in told.items():  # those that were reset instead
-            info["_reward_terms"][number] = False
-            info = self._add_info(info, own, number)
-        return seen, rows[:, 0].copy(), ends, cuts, info
+        given = self._asked("step", [actions[part].tobytes() for part in self._shares])
+        flat = np.frombuffer(b"".join(rows for rows, _ in given))
+        columns = flat.reshape(self.num_envs, -1).T.copy()  # each in memory of its own
+        seen = columns[-self._size :].T.astype(np.float32, order="C")
+        ends, cuts = columns[1:3].astype(bool)
+        info = self._info(columns)
+        for part, (_, told) in zip(self._shares, given, strict=True):
+            for number, own in told.items():  # of those that were reset instead
+                info["_reward_terms"][part[number]] = False
+                info = self._add_info(info, own, int(part[number]))
+        return seen, columns[0], ends, cuts, info
 
     def render(self) -> tuple[UInt8[np.ndarray, "h w 3"], ...] | None:
         """A picture of each, if ``render_mode`` asks for it."""
@@ -199,12 +197,12 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
         own = self._own((what, parts[-1]))
         return [*map(_answered, self._workers), own]
 
-    def _info(self, rows: Float[np.ndarray, "n k"]) -> Info:
+    def _info(self, columns: Float[np.ndarray, "k n"]) -> Info:
         """What Gymnasium's ``_add_info`` would make of the ``info`` of all."""
         have = np.ones(self.num_envs, dtype=bool)
-        terms: Info = {name: rows[:, n].copy() for n, name in enumerate(self._terms, 6)}
-        terms |= {f"_{name}": have for name in self._terms}
-        command = rows[:, 3:6].copy()
+        terms: Info = dict(zip(self._terms, columns[6:], strict=False))
+        terms |= dict.fromkeys([f"_{name}" for name in self._terms], have)
+        command = columns[3:6].T.copy()
         return {
             "reward_terms": terms,
             "_reward_terms": have,
