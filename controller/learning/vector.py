@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Sequence
+from multiprocessing.util import Finalize
 from typing import Any
 
 import numpy as np
@@ -128,6 +129,8 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
         self._shares = np.array_split(np.arange(num_envs), min(workers or processors(), num_envs))
         shares = [Share(len(part), settings) for part in self._shares]
         self._own, self._workers = shares[-1], [Worker(order_of(share)) for share in shares[:-1]]
+        # Also of one that nobody closes: Python would wait for them at its exit.
+        self._end = Finalize(self, _end_all, [self._workers], exitpriority=0)
 
     def reset(
         self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
@@ -187,8 +190,7 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
 
     def close_extras(self, **_: object) -> None:
         """End the processes."""
-        for worker in self._workers:
-            worker.end()
+        self._end()
 
     def _asked(self, what: str, parts: Sequence[object]) -> list[Any]:
         """What each share gives, all at the same time."""
@@ -209,6 +211,11 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
             "command": command,
             "_command": np.ones(self.num_envs, dtype=bool),
         }
+
+
+def _end_all(workers: Sequence[Worker]) -> None:
+    for worker in workers:
+        worker.end()
 
 
 def _answered(worker: Worker) -> Any:  # noqa: ANN401

@@ -76,6 +76,12 @@ def test_a_seed_gives_the_same_bits_whatever_was_before(name: str) -> None:
     assert not np.array_equal(run(fresh, 7)[-1][0], run(fresh, 8)[-1][0])
 
 
+def test_noise_is_drawn_from_the_seed_too() -> None:
+    environment = Go2Env(terms=("joint_positions",), sensors="noisy", randomise=False)
+    first, second = (environment.reset(seed=seed)[0] for seed in (1, 2))
+    assert (first != second).all()
+
+
 def test_a_seed_draws_the_world_within_the_spread_of_the_task() -> None:
     environment, worlds = Go2Env("rough"), []
     for seed in range(30):

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -47,6 +49,15 @@ def test_each_gives_what_it_gives_alone_and_is_reset_by_the_step_after_its_end()
     assert together.action_space.contains(ACTIONS[0])
     together.close()
     together.close()
+
+
+def test_one_that_nobody_closes_ends_with_its_program() -> None:
+    program = (
+        "from controller.learning import Go2VectorEnv; envs = Go2VectorEnv(2, workers=2); "
+        "print(envs.reset(seed=0)[0].shape); kept = [envs]; kept.append(kept); raise SystemExit(3)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, timeout=120)
+    assert (done.returncode, done.stdout) == (3, b"(2, 50)\n"), done.stderr
 
 
 def test_wrong_numbers_are_named_and_so_is_a_worker_that_dies() -> None:
