@@ -61,6 +61,27 @@ def test_they_are_registered_by_an_import_and_by_the_name_of_the_module() -> Non
     assert done.stdout.strip() == f"({OBSERVATION.size},)", done.stderr
 
 
+def test_without_the_extra_the_room_opens_and_what_is_missing_is_named() -> None:
+    program = """
+import sys
+sys.modules.update(gymnasium=None, pyarrow=None)
+import controller.learning as learning
+print(learning.OBSERVATION.size)
+for use in (lambda: learning.Go2Env(), lambda: learning.record("walk.parquet")):
+    try:
+        use()
+    except Exception as error:
+        print(type(error).__name__, error)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    size, *told = done.stdout.splitlines()
+    assert int(size) == OBSERVATION.size, done.stderr
+    assert len(told) == 2
+    for line in told:
+        assert line.startswith("MissingDependency")
+        assert "go2-wbc[learning]" in line
+
+
 @pytest.mark.parametrize("name", TASKS)
 def test_a_seed_gives_the_same_bits_whatever_was_before(name: str) -> None:
     fresh, used = Go2Env(name, sensors="noisy"), Go2Env(name, sensors="noisy")
