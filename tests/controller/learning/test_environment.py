@@ -14,7 +14,7 @@ pytest.importorskip("gymnasium", reason='needs pip install "go2-wbc[learning]"')
 import gymnasium
 from gymnasium.utils.env_checker import check_env
 
-from controller.learning import ENVIRONMENTS, TASKS, Go2Env
+from controller.learning import ENVIRONMENTS, TASKS, Go2Env, LearningTask
 from controller.learning.tasks import WEIGHTS
 from controller.observation import OBSERVATION, RATE, STANCE, TARGETS, TORQUES
 from go2_wbc.errors import CommandError
@@ -242,7 +242,9 @@ def test_wrong_settings_are_named(settings: dict[str, Any], told: str) -> None:
         Go2Env(**settings)
 
 
-def test_wrong_options_and_actions_are_named() -> None:
+def test_wrong_options_actions_and_weights_are_named() -> None:
+    with pytest.raises(CommandError, match="bounce"):
+        LearningTask("own", weights={"bouncing": 1.0})
     environment = Go2Env()
     for options in ({"speed": 1.0}, {"command": (1.0,)}, {"command": (math.nan, 0.0, 0.0)}):
         with pytest.raises(CommandError, match="command"):
