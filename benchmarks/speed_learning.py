@@ -22,8 +22,8 @@ ROUNDS = 5  #: One, two and many environments in turn
 MANY = 8
 SPREAD = 0.3  #: Of the random actions: the robot stumbles about and rarely falls
 ENVIRONMENTS_TABLE = {
-    "one environment, 50 actions a second": tuple(
-        (f"{name}.{kind}", f"times real time, {kind}, processor time", bar)
+    "one environment, 50 actions a second, processor time": tuple(
+        (f"{name}.{kind}", f"{name}, {kind}: times real time", bar)
         for name in ENVIRONMENTS
         for kind, bar in zip(ACTIONS, (">= 20", ">="), strict=True)
     ),

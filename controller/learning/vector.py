@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Sequence
+from multiprocessing.util import Finalize
 from typing import Any
 
 import numpy as np
@@ -32,8 +33,13 @@ class Share:
         self._environments: list[Go2Env] = []
         self._are_over = [False] * count
 
-    def __call__(self, asked: tuple[str, Any]) -> list[Any]:
-        """What each gives for ("reset", seeds and options), ("step", actions) or ("render", None).
+    def __call__(self, asked: tuple[str, Any]) -> Any:  # noqa: ANN401
+        """What they give.
+
+        Args:
+            asked: ("step", actions) gives rows of numbers, see ``_row``, and what those
+                tell by number that are reset instead; ("reset", seeds and options) and ("render",
+                None) what ``Go2Env`` gives, one after the other.
 
         Raises:
             CommandError: as ``Go2Env``.
@@ -44,21 +50,37 @@ class Share:
         if what == "render":
             return [environment.render() for environment in self._environments]
         if what == "step":
-            return [self._step(number, action) for number, action in enumerate(given)]
+            told: dict[int, Info] = {}
+            actions = np.frombuffer(given, dtype=np.float32).reshape(-1, 12)
+            rows = [self._step(number, action, told) for number, action in enumerate(actions)]
+            return np.array(rows).tobytes(), told
         seeds, options = given
         self._are_over = [False] * self._count
         pairs = zip(self._environments, seeds, strict=True)
         return [environment.reset(seed=seed, options=options) for environment, seed in pairs]
 
-    def _step(self, number: int, action: Float32[np.ndarray, "12"]) -> Step:
+    def _step(
+        self, number: int, action: Float32[np.ndarray, "12"], told: dict[int, Info]
+    ) -> Float[np.ndarray, " k"]:
         environment = self._environments[number]
         if self._are_over[number]:
             self._are_over[number] = False
-            seen, info = environment.reset()
-            return seen, 0.0, False, False, info
+            seen, told[number] = environment.reset()
+            gains = dict.fromkeys(environment.task.weights, 0.0)
+            return _row((seen, 0.0, False, False, {**told[number], "reward_terms": gains}))
         step = environment.step(action)
         self._are_over[number] = step[2] or step[3]
-        return step
+        return _row(step)
+
+
+def _row(step: Step) -> Float[np.ndarray, " k"]:
+    """A step as numbers: reward, is over, is cut, command, terms of the reward, observation.
+
+    Quicker to send than a tuple with dictionaries, and to put together with others.
+    """
+    seen, reward, is_over, is_cut, info = step
+    gains = info["reward_terms"].values()
+    return np.concatenate([[reward, is_over, is_cut, *info["command"], *gains], seen])
 
 
 class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
@@ -96,6 +118,7 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
         one = Go2Env(**settings)
         one.close()
         self.num_envs, self.render_mode = num_envs, one.render_mode
+        self._size, self._terms = one.layout.size, [*one.task.weights]
         self.single_observation_space, self.single_action_space = (
             one.observation_space,
             one.action_space,
@@ -106,6 +129,8 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
         self._shares = np.array_split(np.arange(num_envs), min(workers or processors(), num_envs))
         shares = [Share(len(part), settings) for part in self._shares]
         self._own, self._workers = shares[-1], [Worker(order_of(share)) for share in shares[:-1]]
+        # Also of one that nobody closes: Python would wait for them at its exit.
+        self._end = Finalize(self, _end_all, [self._workers], exitpriority=0)
 
     def reset(
         self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
@@ -128,8 +153,11 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
         if len(seeds) != self.num_envs:
             raise CommandError(f"{self.num_envs} environments want as many seeds, got {len(seeds)}")
         parts = [([seeds[number] for number in part], options) for part in self._shares]
-        given = self._asked("reset", parts)
-        return np.array([seen for seen, _ in given]), self._joined([info for _, info in given])
+        given = [one for part in self._asked("reset", parts) for one in part]
+        info: Info = {}
+        for number, (_, own) in enumerate(given):
+            info = self._add_info(info, own, number)
+        return np.array([seen for seen, _ in given]), info
 
     def step(self, actions: np.ndarray) -> tuple[Rows, Float[np.ndarray, " _"], Flags, Flags, Info]:
         """A step of each; see ``Go2Env.step``.
@@ -141,49 +169,56 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
         actions = np.asarray(actions, dtype=np.float32)
         if actions.shape != (self.num_envs, 12):
             raise CommandError(f"actions must be ({self.num_envs}, 12), got {actions.shape}")
-        given = self._asked("step", [actions[part] for part in self._shares])
-        seen, rewards, ends, cuts, infos = zip(*given, strict=True)
-        return (
-            np.array(seen),
-            np.array(rewards),
-            np.array(ends),
-            np.array(cuts),
-            self._joined(infos),
-        )
+        given = self._asked("step", [actions[part].tobytes() for part in self._shares])
+        flat = np.frombuffer(b"".join(rows for rows, _ in given))
+        columns = flat.reshape(self.num_envs, -1).T.copy()  # each in memory of its own
+        seen = columns[-self._size :].T.astype(np.float32, order="C")
+        ends, cuts = columns[1:3].astype(bool)
+        info = self._info(columns)
+        for part, (_, told) in zip(self._shares, given, strict=True):
+            for number, own in told.items():  # of those that were reset instead
+                info["_reward_terms"][part[number]] = False
+                info = self._add_info(info, own, int(part[number]))
+        return seen, columns[0], ends, cuts, info
 
     def render(self) -> tuple[UInt8[np.ndarray, "h w 3"], ...] | None:
         """A picture of each, if ``render_mode`` asks for it."""
         if self.render_mode is None:
             return None
-        return tuple(self._asked("render", [None] * len(self._shares)))
+        given = self._asked("render", [None] * len(self._shares))
+        return tuple(picture for part in given for picture in part)
 
     def close_extras(self, **_: object) -> None:
         """End the processes."""
-        for worker in self._workers:
-            worker.end()
+        self._end()
 
     def _asked(self, what: str, parts: Sequence[object]) -> list[Any]:
-        """What all environments give, each share at the same time."""
+        """What each share gives, all at the same time."""
         for worker, part in zip(self._workers, parts[:-1], strict=True):
             worker.give(pickle.dumps((what, part)))
         own = self._own((what, parts[-1]))
-        return [*(one for worker in self._workers for one in _answered(worker)), *own]
+        return [*map(_answered, self._workers), own]
 
-    def _joined(self, infos: Sequence[Info]) -> Info:
-        """One ``info`` of all, as Gymnasium has it; quickly, unless one has just been reset."""
-        joined: Info = {}
-        if not all("reward_terms" in info for info in infos):
-            for number, info in enumerate(infos):
-                joined = self._add_info(joined, info, number)
-            return joined
-        have, gains = np.ones(self.num_envs, dtype=bool), [info["reward_terms"] for info in infos]
-        terms: Info = {name: np.array([gain[name] for gain in gains]) for name in gains[0]}
-        terms |= {f"_{name}": have for name in gains[0]}
-        command = np.array([info["command"] for info in infos])
-        return {"reward_terms": terms, "_reward_terms": have, "command": command, "_command": have}
+    def _info(self, columns: Float[np.ndarray, "k n"]) -> Info:
+        """What Gymnasium's ``_add_info`` would make of the ``info`` of all."""
+        have = np.ones(self.num_envs, dtype=bool)
+        terms: Info = dict(zip(self._terms, columns[6:], strict=False))
+        terms |= dict.fromkeys([f"_{name}" for name in self._terms], have)
+        command = columns[3:6].T.copy()
+        return {
+            "reward_terms": terms,
+            "_reward_terms": have,
+            "command": command,
+            "_command": np.ones(self.num_envs, dtype=bool),
+        }
 
 
-def _answered(worker: Worker) -> list[Any]:
+def _end_all(workers: Sequence[Worker]) -> None:
+    for worker in workers:
+        worker.end()
+
+
+def _answered(worker: Worker) -> Any:  # noqa: ANN401
     answer = worker.wait()
     if answer is None:
         raise SweepError("a worker of the environments has died: make them anew")

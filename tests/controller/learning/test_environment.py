@@ -14,7 +14,7 @@ pytest.importorskip("gymnasium", reason='needs pip install "go2-wbc[learning]"')
 import gymnasium
 from gymnasium.utils.env_checker import check_env
 
-from controller.learning import ENVIRONMENTS, TASKS, Go2Env
+from controller.learning import ENVIRONMENTS, TASKS, Go2Env, LearningTask
 from controller.learning.tasks import WEIGHTS
 from controller.observation import OBSERVATION, RATE, STANCE, TARGETS, TORQUES
 from go2_wbc.errors import CommandError
@@ -61,6 +61,27 @@ def test_they_are_registered_by_an_import_and_by_the_name_of_the_module() -> Non
     assert done.stdout.strip() == f"({OBSERVATION.size},)", done.stderr
 
 
+def test_without_the_extra_the_room_opens_and_what_is_missing_is_named() -> None:
+    program = """
+import sys
+sys.modules.update(gymnasium=None, pyarrow=None)
+import controller.learning as learning
+print(learning.OBSERVATION.size)
+for use in (lambda: learning.Go2Env(), lambda: learning.record("walk.parquet")):
+    try:
+        use()
+    except Exception as error:
+        print(type(error).__name__, error)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    size, *told = done.stdout.splitlines()
+    assert int(size) == OBSERVATION.size, done.stderr
+    assert len(told) == 2
+    for line in told:
+        assert line.startswith("MissingDependency")
+        assert "go2-wbc[learning]" in line
+
+
 @pytest.mark.parametrize("name", TASKS)
 def test_a_seed_gives_the_same_bits_whatever_was_before(name: str) -> None:
     fresh, used = Go2Env(name, sensors="noisy"), Go2Env(name, sensors="noisy")
@@ -74,6 +95,12 @@ def test_a_seed_gives_the_same_bits_whatever_was_before(name: str) -> None:
             assert np.array_equal(one[0], other[0])
             assert one[1:4] == other[1:4]
     assert not np.array_equal(run(fresh, 7)[-1][0], run(fresh, 8)[-1][0])
+
+
+def test_noise_is_drawn_from_the_seed_too() -> None:
+    environment = Go2Env(terms=("joint_positions",), sensors="noisy", randomise=False)
+    first, second = (environment.reset(seed=seed)[0] for seed in (1, 2))
+    assert (first != second).all()
 
 
 def test_a_seed_draws_the_world_within_the_spread_of_the_task() -> None:
@@ -215,7 +242,9 @@ def test_wrong_settings_are_named(settings: dict[str, Any], told: str) -> None:
         Go2Env(**settings)
 
 
-def test_wrong_options_and_actions_are_named() -> None:
+def test_wrong_options_actions_and_weights_are_named() -> None:
+    with pytest.raises(CommandError, match="bounce"):
+        LearningTask("own", weights={"bouncing": 1.0})
     environment = Go2Env()
     for options in ({"speed": 1.0}, {"command": (1.0,)}, {"command": (math.nan, 0.0, 0.0)}):
         with pytest.raises(CommandError, match="command"):

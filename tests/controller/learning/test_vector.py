@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -36,6 +38,10 @@ def test_each_gives_what_it_gives_alone_and_is_reset_by_the_step_after_its_end()
                 for name, gain in info["reward_terms"].items():
                     assert infos["reward_terms"][name][number] == gain
                 assert np.array_equal(infos["command"][number], info["command"])
+            steps = infos["_reward_terms"][number], infos["reward_terms"]["_turn"][number]
+            assert steps == (step != 5, step != 5)
+            assert infos["_command"][number]
+            assert ("_world" in infos) == (step == 5)
             assert np.array_equal(seen[number], own)
             assert (rewards[number], ends[number], cuts[number]) == tuple(expected)
         assert cuts.all() == (step == 4)
@@ -43,6 +49,15 @@ def test_each_gives_what_it_gives_alone_and_is_reset_by_the_step_after_its_end()
     assert together.action_space.contains(ACTIONS[0])
     together.close()
     together.close()
+
+
+def test_one_that_nobody_closes_ends_with_its_program() -> None:
+    program = (
+        "from controller.learning import Go2VectorEnv; envs = Go2VectorEnv(2, workers=2); "
+        "print(envs.reset(seed=0)[0].shape); kept = [envs]; kept.append(kept); raise SystemExit(3)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, timeout=120)
+    assert (done.returncode, done.stdout) == (3, b"(2, 50)\n"), done.stderr
 
 
 def test_wrong_numbers_are_named_and_so_is_a_worker_that_dies() -> None:
