@@ -9,6 +9,7 @@
     ├── ModeError               a call that the present mode does not allow
     ├── ClosedError             a call after close()
     ├── BridgeError             other middleware cannot be reached or used
+    ├── PolicyError             a learned policy, or its sidecar, cannot be used; says why
     ├── SweepError              a run over seeds cannot begin or go on; says what is kept
     ├── QpError
     │   ├── QpInfeasible        no solution satisfies the constraints; carries residuals
@@ -68,6 +69,10 @@ class ClosedError(Go2WbcError):
 
 class BridgeError(Go2WbcError):
     """Other middleware cannot be reached or used; says why."""
+
+
+class PolicyError(Go2WbcError, ValueError):
+    """A learned policy or its sidecar cannot be used, or has given what is not finite."""
 
 
 class SweepError(Go2WbcError):
@@ -191,6 +196,7 @@ EXTRAS: Mapping[str, str] = {
     "music": "the beats of a song: dance",
     "sweep": "sweeps as Parquet files",
     "cluster": "sweeps on many machines",
+    "policies": "learned policies: walk(policy=...), in ONNX files",
     "gamepad": "a gamepad for teleop",
     "mcap": "recordings as MCAP files, for Foxglove",
     "rerun": "recordings as rrd files, for Rerun (490 MB)",

@@ -379,6 +379,19 @@ class LocomotionPlanner:
         return self._state.is_stepping
 
     @property
+    def phase(self) -> float:
+        """Share of the front left foot's stride that has passed since it touched down."""
+        clock = self._state.clock
+        return float((clock.time / clock.period - clock.offsets[0]) % 1.0)
+
+    @typed(late=True)
+    def follow_touchdown(self, leg: int, share: float) -> None:
+        """Somebody else moves the feet, and ``leg`` has come down: go that ``share`` towards it."""
+        clock = self._state.clock
+        ahead = (clock.time / clock.period - clock.offsets[leg] + 0.5) % 1.0 - 0.5
+        clock.time = (clock.time - share * ahead * clock.period) % clock.period
+
+    @property
     def heading(self) -> float:
         """Yaw [rad] of the reference; 0 before ``start``."""
         return float(self._state.trunk.yaw)
