@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from controller.policies.sidecar import PER_JOINT, Sidecar
+from controller.observation import sensed
+from controller.policies.sidecar import Sidecar
 from go2_wbc.arguments import typed
 from go2_wbc.errors import MissingDependency, PolicyError, install_line
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
@@ -59,13 +60,12 @@ class Observer:
 
     def _row(self, state: RobotState, command: VelocityCommand) -> Float[np.ndarray, " n"]:
         side, parts = self._sidecar, []
+        seen = sensed(state)
         values = {
-            "linear_velocity": state.v[:3],
-            "angular_velocity": state.v[3:6],
-            "gravity": -state.R_world_base[2],
+            **seen,
             "command": np.array([command.linear_x, command.linear_y, command.angular_z]),
-            "joint_positions": side.signs * state.joint_positions[side.order] - side.default,
-            "joint_velocities": side.signs * state.joint_velocities[side.order],
+            "joint_positions": side.signs * seen["joint_positions"][side.order] - side.default,
+            "joint_velocities": side.signs * seen["joint_velocities"][side.order],
             "last_action": self.action,
         }
         for i, term in enumerate(side.terms):

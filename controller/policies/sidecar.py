@@ -24,14 +24,12 @@ from jaxtyping import Float, Int
 
 from go2_wbc.brief import brief
 from go2_wbc.errors import PolicyError, unknown_name
-from go2_wbc.legs import LEGS
+from go2_wbc.legs import JOINT_NAMES
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.records import Array12
 from go2_wbc.robot.description import GO2
 from go2_wbc.validation import is_finite_number
 
-JOINTS = tuple(f"{leg.name}_{joint}" for leg in LEGS for joint in ("hip", "thigh", "calf"))
-"""Names of the joints, in this project's order."""
 SIZES = {
     "linear_velocity": 3,
     "angular_velocity": 3,
@@ -40,10 +38,9 @@ SIZES = {
     "joint_positions": 12,
     "joint_velocities": 12,
     "last_action": 12,
-    "phase": 2,
+    "clock": 2,
 }
-"""What an observation may hold, and how many numbers; of a phase for each of its offsets."""
-PER_JOINT = ("joint_positions", "joint_velocities", "last_action")
+"""What an observation may hold, and how many numbers; of a clock for each of its offsets."""
 LAYOUTS = ("frames", "terms")
 RANGES = ("forward", "lateral", "turning")
 RATES = 10.0, 500.0
@@ -58,8 +55,8 @@ class Term:
     Attributes:
         name: a key of ``SIZES``.
         scale: of each of its numbers.
-        frequency: of a phase [Hz].
-        offsets: of a phase: for each one sine and cosine of the phase plus it.
+        frequency: of a clock [Hz].
+        offsets: of a clock: for each one sine and cosine of its phase plus it.
     """
 
     name: str
@@ -230,17 +227,17 @@ def _order(names: object) -> Int[np.ndarray, "12"]:
     """The joints' numbers by their names, with or without ``_joint``."""
     if not isinstance(names, list):
         raise PolicyError(f"joints.order must be a list of 12 names, got {names!r:.80}")
-    known = [str(name).removesuffix("_joint") for name in names]
+    known = [f"{str(name).removesuffix('_joint')}_joint" for name in names]
     for name in known:
-        if name not in JOINTS:
-            raise PolicyError(unknown_name("name in joints.order", name, JOINTS))
-    if sorted(known) != sorted(JOINTS):
-        missing = [name for name in JOINTS if name not in known]
+        if name not in JOINT_NAMES:
+            raise PolicyError(unknown_name("name in joints.order", name, JOINT_NAMES))
+    if sorted(known) != sorted(JOINT_NAMES):
+        missing = [name for name in JOINT_NAMES if name not in known]
         raise PolicyError(
             f"joints.order must name each of 12 joints once, got {len(known)}"
             + (f" without {', '.join(missing)}" if missing else "")
         )
-    return np.array([JOINTS.index(name) for name in known])
+    return np.array([JOINT_NAMES.index(name) for name in known])
 
 
 def _term(content: object, where: str) -> Term:
@@ -250,7 +247,7 @@ def _term(content: object, where: str) -> Term:
     name = table.value("name")
     if name not in SIZES:
         raise PolicyError(unknown_name(f"{where}.name", str(name), SIZES))
-    if name != "phase":
+    if name != "clock":
         table.only("name", "scale")
         return Term(name, table.numbers("scale", SIZES[name], 1.0))
     table.only("name", "scale", "frequency", "offsets")
