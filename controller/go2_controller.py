@@ -17,6 +17,7 @@ from controller.assembly import build_pilot
 from controller.modes import Aborted, Measurements, Mode, Outcome
 from controller.navigation import DriveStraight, TurnInPlace
 from controller.pacing import REASON, LogOnce
+from controller.policies.policy import Policy
 from controller.telemetry import SeenTerrain, Telemetry
 from go2_wbc.arguments import typed
 from go2_wbc.config import Config
@@ -149,19 +150,25 @@ class GO2Controller:
 
     # --- walking --------------------------------------------------------------------------
 
-    @typed(error=CommandError)
-    def walk(self, gait: Gait | str = "trot") -> bool:
+    @typed("policy", error=CommandError)
+    def walk(self, gait: Gait | str = "trot", *, policy: Path | Policy | str | None = None) -> bool:
         """Enter walking mode; the robot stands ready until ``move``. Stands up first if needed.
 
         One that walks already passes over into the gait, its command clipped into the envelope.
 
         Args:
             gait: name of a gait, "auto" for one by the speed, or a gait of your own.
+            policy: a learned one, by its ONNX file, beside which lies its sidecar: it walks while
+                there is a command. Without one the gait lets the robot come to rest.
 
         Raises:
             CommandError: for an unknown gait; lists the valid ones.
+            PolicyError: for a policy that cannot be used, or is another robot's.
+            MissingDependency: for a policy without the extra ``policies``.
         """
-        return self._call("walk", lambda: self._pilot.walk(gait))
+        self._check_open()
+        learned = None if policy is None else arguments.policy(policy, self._plant)
+        return self._call("walk", lambda: self._pilot.walk(gait, learned))
 
     def move(
         self,

@@ -384,12 +384,18 @@ class LocomotionPlanner:
         clock = self._state.clock
         return float((clock.time / clock.period - clock.offsets[0]) % 1.0)
 
-    @typed(late=True)
-    def follow_touchdown(self, leg: int, share: float) -> None:
-        """Somebody else moves the feet, and ``leg`` has come down: go that ``share`` towards it."""
-        clock = self._state.clock
-        ahead = (clock.time / clock.period - clock.offsets[leg] + 0.5) % 1.0 - 0.5
-        clock.time = (clock.time - share * ahead * clock.period) % clock.period
+    def follow_feet(self, landed: Bool[np.ndarray, "4"], share: float) -> None:
+        """Somebody else moves the feet: keep in step, and learn nothing of rough ground by them.
+
+        Args:
+            landed: which have just come down.
+            share: of the way to where the stride would be by them, that its clock goes.
+        """
+        clock, ground = self._state.clock, self._state.ground
+        for leg in np.flatnonzero(landed).tolist():
+            ahead = (clock.time / clock.period - clock.offsets[leg] + 0.5) % 1.0 - 0.5
+            clock.time = (clock.time - share * ahead * clock.period) % clock.period
+        ground.rough_way = ground.high_way = ground.ramp_way = 0.0
 
     @property
     def heading(self) -> float:
