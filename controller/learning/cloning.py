@@ -2,9 +2,9 @@
 
 DAgger (Ross, Gordon and Bagnell 2011): what the network does decides which states are visited, and
 the teacher says in each of them what it would do. It walks in the shadow: its planner and QP are
-given the measured state in every tick, while the plant follows another. The label of a period is
-the joint target that comes nearest to the teacher's torques tau over its ticks k, with the servo's
-gains:
+given the measured state in every tick, while the plant follows the network, at first for a part of
+the time only. The label of a period is the joint target that comes nearest to the teacher's torques
+tau over its ticks k, with the servo's gains:
 
     q* = mean_k (q_k + (tau_k + kd v_k) / kp)       min sum_k |kp (q* - q_k) - kd v_k - tau_k|^2
 """
@@ -12,51 +12,115 @@ gains:
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
-from controller.go2_controller import GO2Controller
 from controller.learning.network import Network
-from controller.policies.policy import Observer, Player, Policy
+from controller.observation import STANCE, STANCE_HEIGHT
+from controller.policies.policy import Player, Policy
 from controller.policies.sidecar import Sidecar
 from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.locomotion import LocomotionPlanner
 from go2_wbc.plant import MujocoPlant
+from go2_wbc.records import Array12
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand, RobotState
 from go2_wbc.wbc.controller import WholeBodyController
 
-FRICTION, MASS = (0.5, 1.0), (0.9, 1.1)  #: Ranges of the floor's friction and of a factor on masses
-FALLEN = 0.8  #: Tilt [rad] at which an episode ends
-LOW = 0.16  #: Height [m] of the base at which it does
-STEADY = 1.5  #: Time [s] after which a command changes, at least; at most twice that
-PUSH = 12.0  #: Greatest impulse [N s] of the pushes that show the network how to recover
-PUSH_TIME = 0.1
+FRICTION, MASS = (0.5, 1.0), (0.9, 1.1)  #: Ranges of the floor's friction, of a factor on masses
+FALLEN, LOW = 0.8, 0.16  #: Tilt [rad], or height [m] of the base, with which an episode ends
+STEADY, PAUSE = (1.5, 3.0), (1.5, 4.0)  #: Time [s] of a command, and between two pushes
+PUSH, PUSH_TIME = 12.0, 0.1  #: Greatest impulse [N s] of a push, and its time [s]
+TURN = 0.2  #: Time [s] after which it is drawn anew who moves the robot
+LEASHES = {"position_leash": 0.02, "yaw_leash": 0.05}
+"""[m], [rad] The teacher follows velocities, not places that no policy knows: it is held on short
+ones. Shorter still, the network walked 0.07 m/s too fast."""
+SHARES = 1.0, 0.5, 0.25, 0.1, 0.05
+"""Of the time in which the teacher moves the robot, round by round; 0 from then on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """How long a network is taught.
+
+    Attributes:
+        rounds: of trotting and fitting.
+        seconds: robot time [s] in each.
+        steps: of the fit after each; three times as many after the last.
+        units: in each of the two layers.
+        seed: of all that is drawn.
+    """
+
+    rounds: int = 10
+    seconds: float = 120.0
+    steps: int = 2000
+    units: int = 128
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """What came of a round.
+
+    Attributes:
+        number: from 1 on.
+        share: of the time in which the teacher moved the robot.
+        stayed_up: mean time [s] for which the robot did, of ``EPISODE``.
+        samples: so far.
+        error: root mean square [rad] by which the network misses its labels.
+        network: as it is now.
+    """
+
+    number: int
+    share: float
+    stayed_up: float
+    samples: int
+    error: float
+    network: Network
+
+
+EPISODE = 20.0  #: Longest time [s] that a robot trots before another one begins
+
+
+def clone(sidecar: Sidecar, course: Course | None = None) -> Iterator[Round]:
+    """Teach a network the trot, round by round; what it sees and does is what ``sidecar`` says."""
+    c = course or Course()
+    rng = np.random.default_rng(c.seed)
+    network = Network((sidecar.observation_size, c.units, c.units, 12), rng)
+    policy = Policy("student", sidecar, network)
+    seen: list[Float[np.ndarray, " n"]] = []
+    done: list[Array12] = []
+    for number in range(1, c.rounds + 1):
+        share = SHARES[number - 1] if number <= len(SHARES) else 0.0
+        times: list[float] = []
+        while sum(times) < c.seconds:
+            lesson = Lesson(policy, rng, share)
+            times.append(lesson.give(min(EPISODE, c.seconds)))
+            seen += lesson.seen
+            done += lesson.done
+        steps = c.steps if number < c.rounds else 3 * c.steps
+        error = network.fit(np.array(seen), np.array(done), steps)
+        missed = float(np.sqrt(error) * np.abs(sidecar.action_scale).mean())
+        yield Round(number, share, float(np.mean(times)), len(seen), missed, network)
 
 
 class Teacher:
-    """The whole-body controller's trot, asked what it would do in any state of a robot that trots.
+    """The whole-body controller's trot, asked what it would do with a robot that trots.
 
     Its stride does not depend on the speed, and it follows velocities and no places: what it does
     follows from what a policy can observe.
     """
 
-    def __init__(self, model: RobotModel) -> None:
-        """Teach robots like ``model``."""
-        config = Config()
-        walk = replace(config.locomotion, position_leash=0.02, yaw_leash=0.05)
-        gait = replace(GAITS["trot"], stride=None)
-        self._planner = LocomotionPlanner(model, gait, walk)
-        self._wbc, self._model = WholeBodyController(model, config=config.wbc), model
-        self.frequency = 1.0 / gait.period
-
-    def start(self, state: RobotState) -> None:
+    def __init__(self, model: RobotModel, start: RobotState) -> None:
         """Begin with a robot that stands."""
-        self._planner.start(self._model.snapshot(state))
+        config, gait = Config(), replace(GAITS["trot"], stride=None)
+        self._planner = LocomotionPlanner(model, gait, replace(config.locomotion, **LEASHES))
+        self._wbc, self._model = WholeBodyController(model, config=config.wbc), model
+        self._planner.start(model.snapshot(start))
 
     @property
     def phase(self) -> float:
@@ -70,91 +134,73 @@ class Teacher:
         return self._wbc.solve(now, reference, relax=True).command
 
 
-@dataclass(slots=True)
-class Samples:
-    """What was observed, and what the teacher would have done: rows of both."""
-
-    observations: list[Float[np.ndarray, " n"]] = field(default_factory=list)
-    actions: list[Float[np.ndarray, "12"]] = field(default_factory=list)
-
-
 class Lesson:
-    """A robot that trots by commands that change, pushed now and then, and is watched.
+    """A robot that trots by commands that change, pushed now and then, and what is learnt by it.
 
-    Args:
-        policy: what is taught.
-        share: of the time in which the teacher moves the robot itself.
+    Attributes:
+        seen, done: observations, and the actions of the teacher.
     """
 
-    def __init__(self, policy: Policy, seed: int, share: float) -> None:
-        self._rng = np.random.default_rng(seed)
-        self._policy, self._share = policy, share
-        rng = self._rng
-        self._plant = MujocoPlant(
-            friction=rng.uniform(*FRICTION), mass_scale=rng.uniform(*MASS), seed=seed
-        )
-        go2 = GO2Controller(plant=self._plant)
-        go2.stand()
-        go2.close()
-        self._model = RobotModel()
+    def __init__(self, policy: Policy, rng: np.random.Generator, share: float) -> None:
+        """Teach ``policy``; for a ``share`` of the time the teacher moves the robot itself."""
+        self.seen: list[Float[np.ndarray, " n"]] = []
+        self.done: list[Array12] = []
+        self._side, self._rng, self._share = policy.sidecar, rng, share
+        friction, mass = rng.uniform(*FRICTION), rng.uniform(*MASS)
+        self._plant, model = MujocoPlant(friction=friction, mass_scale=mass), RobotModel()
+        self._plant.place(np.array([0.0, 0.0, STANCE_HEIGHT, 0.0, 0.0, 0.0, 1.0, *STANCE * 4]))
+        self._teacher = Teacher(model, self._plant.read())
+        self._player = Player(policy, model.q_lower, model.q_upper)
+        order = np.argsort(policy.sidecar.order)
+        self._kp, self._kd = policy.sidecar.kp[order], policy.sidecar.kd[order]
 
-    def give(self, samples: Samples, seconds: float) -> float:
-        """Fill ``samples``; returns how long the robot stayed up [s]."""
-        plant, rng, side = self._plant, self._rng, self._policy.sidecar
-        lower, upper = self._model.q_lower, self._model.q_upper
-        player, watch = Player(self._policy, lower, upper), Observer(side)
-        teacher = Teacher(self._model)
-        state = plant.read()
-        teacher.start(state)
-        start = state.time
-        period = round(1.0 / (side.rate * plant.control_period))
-        command, until = VelocityCommand(), start
-        order = np.argsort(side.order)
-        kp, kd = side.kp[order], side.kd[order]
-        tick, teaches = 0, True
-        pushes = start + rng.uniform(2.0, 5.0)
-        wish = np.zeros(12)
-        has_begun = False
-        while state.time - start < seconds:
-            if state.time >= until:
-                command = draw(side, rng)
-                until = state.time + rng.uniform(STEADY, 2.0 * STEADY)
-            if state.time >= pushes:
-                angle, impulse = rng.uniform(0, 2 * np.pi), rng.uniform(0.0, PUSH)
-                f = impulse / PUSH_TIME * np.array([np.cos(angle), np.sin(angle), 0.0])
-                plant.push(f, PUSH_TIME)
-                pushes = state.time + rng.uniform(1.5, 4.0)
-            if tick % (10 * period) == 0:
-                teaches = rng.random() < self._share
-            told = teacher.ask(state, command)
-            if not has_begun:
-                player.restart(teacher.phase)
-                watch.restart(teacher.phase)
-                has_begun = True
-            if tick % period == 0:
-                if tick:
-                    samples.actions.append(
-                        ((wish / period)[side.order] * side.signs - side.default) / side.action_scale
-                    )
-                wish = np.zeros(12)
-                samples.observations.append(watch.observe(state, command))
-                asked = player.command(state, command)
-                watch.action = player.observer.action
-            wish += state.joint_positions + (told.tau + kd * state.joint_velocities) / kp
-            plant.write(told if teaches else asked)
+    def give(self, seconds: float) -> float:
+        """Let the robot trot, for ``seconds`` at most; returns how long it stayed up [s]."""
+        plant, rng, side = self._plant, self._rng, self._side
+        ticks = round(1.0 / (side.rate * plant.control_period))
+        command, changes, pushed, turns = draw(side, rng), 0.0, rng.uniform(*PAUSE), 0.0
+        start = now = plant.time
+        while (now := plant.time - start) < seconds:
+            if now >= changes:
+                command, changes = draw(side, rng), now + rng.uniform(*STEADY)
+            if now >= pushed:
+                self._push()
+                pushed = now + rng.uniform(*PAUSE)
+            if now >= turns:
+                teaches, turns = rng.random() < self._share, now + TURN
+            self._period(command, ticks, is_first=now == 0.0, teaches=teaches)
             state = plant.read()
-            tick += 1
             if state.tilt > FALLEN or state.q[2] < LOW:
                 break
-        del samples.observations[len(samples.actions):]
-        return state.time - start
+        return now
+
+    def _period(
+        self, command: VelocityCommand, ticks: int, *, is_first: bool, teaches: bool
+    ) -> None:
+        """One period of the policy: what it sees, and what the teacher would do over its ticks."""
+        plant, side, wished = self._plant, self._side, np.zeros(12)
+        for tick in range(ticks):
+            state = plant.read()
+            told = self._teacher.ask(state, command)
+            if is_first and tick == 0:
+                self._player.restart(self._teacher.phase)
+            asked = self._player.command(state, command)
+            damped = told.tau + self._kd * state.joint_velocities
+            wished += state.joint_positions + damped / self._kp
+            plant.write(told if teaches else asked)
+        self.seen.append(self._player.observation)
+        wish = side.signs * (wished / ticks)[side.order]
+        self.done.append((wish - side.default) / side.action_scale)
+
+    def _push(self) -> None:
+        angle, impulse = self._rng.uniform((0.0, 0.0), (2.0 * np.pi, PUSH))
+        force = impulse / PUSH_TIME * np.array([np.cos(angle), np.sin(angle), 0.0])
+        self._plant.push(force, PUSH_TIME)
 
 
 def draw(side: Sidecar, rng: np.random.Generator) -> VelocityCommand:
-    """A command that the policy shall follow."""
-    x = rng.uniform(*side.commands.forward)
-    y, turn = (
-        rng.uniform(*bounds) * (rng.random() < 0.5)
-        for bounds in (side.commands.lateral, side.commands.turning)
-    )
-    return VelocityCommand(x, y, turn)
+    """A command that the policy shall follow; every other one is straight, or does not turn."""
+    ranges = side.commands
+    x, y, turn = rng.uniform(*zip(ranges.forward, ranges.lateral, ranges.turning, strict=True))
+    aside, turns = rng.random(2) < 0.5
+    return VelocityCommand(float(x), float(y) * aside, float(turn) * turns)

@@ -137,7 +137,13 @@ class Policy:
 
 
 class Player:
-    """Plays a policy: asked every tick, it lets the policy act at its own rate."""
+    """Plays a policy: asked every tick, it lets the policy act at its own rate.
+
+    Attributes:
+        policy: what is played.
+        observer: of what it sees.
+        observation: the last one.
+    """
 
     def __init__(self, policy: Policy, lower: Array12, upper: Array12) -> None:
         """Play ``policy``; its targets are kept within these joint angles [rad]."""
@@ -150,7 +156,7 @@ class Player:
     def restart(self, phase: float) -> None:
         """Begin anew at ``phase`` of the stride."""
         self.observer.restart(phase)
-        self._next, self._targets = -np.inf, NOWHERE
+        self._next, self._targets, self.observation = -np.inf, NOWHERE, NOWHERE
 
     def command(self, state: RobotState, command: VelocityCommand = ZERO_COMMAND) -> JointCommand:
         """What the servos are told now.
@@ -161,8 +167,8 @@ class Player:
         period = 1.0 / self.policy.sidecar.rate
         if state.time >= self._next - 1e-6:
             self._next = max(self._next + period, state.time + 0.5 * period)
-            action = self.policy.act(self.observer.observe(state, command))
-            self.observer.action = action
+            self.observation = self.observer.observe(state, command)
+            self.observer.action = action = self.policy.act(self.observation)
             self._targets = np.clip(self.policy.targets(action), self._lower, self._upper)
         return JointCommand(NOWHERE, self._targets, NOWHERE, *self._gains)
 
