@@ -72,5 +72,5 @@ def policy(value: Policy | Path | str, plant: Plant) -> Policy:
     """
     meant = value if isinstance(value, Policy) else Policy.load(value)
     if (robot := meant.sidecar.robot) != plant.robot:
-        raise PolicyError(f"policy {meant.name} is of a {robot}, the plant is a {plant.robot}")
+        raise PolicyError(f"policy {meant.name} is for {robot}, the plant is {plant.robot}")
     return meant

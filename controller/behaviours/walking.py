@@ -28,8 +28,8 @@ STEADYING = 0.15
 class Walking(Behaviour):
     """Walk with ``gait`` and follow ``command`` and ``pose``; stand ready without command.
 
-    With a ``choice`` the gait is chosen by the speed. What is ``learned``, if anything, walks in its
-    stead while there is a command, until it has to be refused.
+    With a ``choice`` the gait is chosen by the speed. What is ``learned``, if anything, walks in
+    its stead while there is a command, until it has to be refused.
     """
 
     label = "walk"

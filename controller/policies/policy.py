@@ -21,7 +21,7 @@ from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.records import Array12
 from go2_wbc.robot.state import JointCommand, RobotState
 
-Network = Callable[[Float[np.ndarray, " n"]], Float[np.ndarray, "m"]]
+Network = Callable[[Float[np.ndarray, " n"]], Float[np.ndarray, " m"]]
 """From an observation to an action."""
 NOWHERE = np.zeros(12)
 NOWHERE.flags.writeable = False
@@ -166,7 +166,8 @@ class Player:
         """
         period = 1.0 / self.policy.sidecar.rate
         if state.time >= self._next - 1e-6:
-            self._next = max(self._next + period, state.time + 0.5 * period)
+            is_late = state.time - self._next > 0.5 * period
+            self._next = period + (state.time if is_late else self._next)
             self.observation = self.observer.observe(state, command)
             self.observer.action = action = self.policy.act(self.observation)
             self._targets = np.clip(self.policy.targets(action), self._lower, self._upper)
@@ -198,7 +199,7 @@ def _network(path: Path, size: int) -> Network:
     name = outputs[0].name
     is_flat = len(shape) == 1
 
-    def network(observation: Float[np.ndarray, " n"]) -> Float[np.ndarray, "m"]:
+    def network(observation: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
         given = observation.astype(np.float32)
         (action,) = session.run([name], {taken: given if is_flat else given[None]})
         return np.asarray(action).ravel()

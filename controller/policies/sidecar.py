@@ -197,6 +197,14 @@ def parse(content: Mapping[str, Any]) -> Sidecar:
     action_scale = action.numbers("scale", 12)
     if not action_scale.all():
         raise PolicyError("action.scale must not be 0")
+    history = observation.number("history", 1, MOST_HISTORY, 1)
+    oldest_first = observation.value("oldest_first", True)
+    if history % 1.0:
+        raise PolicyError(f"observation.history must be a whole number, got {history:g}")
+    if not isinstance(oldest_first, bool):
+        raise PolicyError(
+            f"observation.oldest_first must be true or false, got {oldest_first!r:.80}"
+        )
     layout = observation.value("layout", "frames")
     if layout not in LAYOUTS:
         raise PolicyError(unknown_name("observation.layout", layout, LAYOUTS))
@@ -216,9 +224,9 @@ def parse(content: Mapping[str, Any]) -> Sidecar:
         kd=action.gains("kd"),
         commands=CommandRanges(*(commands.range(name) for name in RANGES)),
         terms=tuple(_term(term, f"observation.terms[{i}]") for i, term in enumerate(terms)),
-        history=int(observation.number("history", 1, MOST_HISTORY, 1)),
+        history=int(history),
         by_terms=layout == "terms",
-        oldest_first=bool(observation.value("oldest_first", True)),
+        oldest_first=oldest_first,
         observation_clip=observation.number("clip", 0.0, np.inf, 100.0),
     )
 

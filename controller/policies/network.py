@@ -21,11 +21,15 @@ LEAST_DEVIATION = 1e-3
 """Of an input: what never changes is not blown up."""
 BATCH = 512
 
-Samples = Float[np.ndarray, "k n"]
+Samples, Labels = Float[np.ndarray, "k n"], Float[np.ndarray, "k m"]
 
 
 class Network:
-    """Layers of tanh between an input and an output."""
+    """Layers of tanh between an input and an output.
+
+    Attributes:
+        parts: weights and biases, which a fit changes in place.
+    """
 
     def __init__(self, sizes: tuple[int, ...], rng: np.random.Generator) -> None:
         """Random weights (Glorot and Bengio 2010) of layers with these numbers of units."""
@@ -34,21 +38,21 @@ class Network:
         ]
         self._biases = [np.zeros(n) for n in sizes[1:]]
         self._mean, self._deviation = np.zeros(sizes[0]), np.ones(sizes[0])
-        self._parts = [*self._weights, *self._biases]
-        self._rng = rng
+        self.parts = [*self._weights, *self._biases]
+        self._rng, self._is_fitted = rng, False
 
     def __call__(self, x: Float[np.ndarray, "*k n"]) -> Float[np.ndarray, "*k m"]:
         """The outputs of inputs."""
         return self._layers((x - self._mean) / self._deviation)[-1]
 
-    def _layers(self, x: Float[np.ndarray, "*k n"]) -> list[Float[np.ndarray, "*k m"]]:
+    def _layers(self, x: Float[np.ndarray, "*k n"]) -> list[Float[np.ndarray, "*k _"]]:
         layers = [x]
         for i, (W, b) in enumerate(zip(self._weights, self._biases, strict=True)):
             y = layers[-1] @ W + b
             layers.append(y if i == len(self._weights) - 1 else np.tanh(y))
         return layers
 
-    def fit(self, x: Samples, y: Samples, steps: int, rate: float = 2e-3) -> float:
+    def fit(self, x: Samples, y: Labels, steps: int, rate: float = 2e-3) -> float:
         """Lower the mean square error of ``y``; the rate falls to 0 by a cosine.
 
         Returns:
@@ -56,14 +60,14 @@ class Network:
         """
         self._normalise(x)
         x = (x - self._mean) / self._deviation
-        means, squares = ([np.zeros_like(p) for p in self._parts] for _ in range(2))
-        errors = []
+        means, squares = ([np.zeros_like(p) for p in self.parts] for _ in range(2))
+        errors = [0.0]
         for done in range(1, steps + 1):
             rows = self._rng.integers(len(x), size=BATCH)
             loss, gradients = self.gradients(x[rows], y[rows])
             errors.append(loss)
             step = 0.5 * rate * (1.0 + np.cos(np.pi * done / steps))
-            for part, g, mean, square in zip(self._parts, gradients, means, squares, strict=True):
+            for part, g, mean, square in zip(self.parts, gradients, means, squares, strict=True):
                 mean += (1.0 - BETA[0]) * (g - mean)
                 square += (1.0 - BETA[1]) * (g * g - square)
                 unbiased = np.sqrt(square / (1.0 - BETA[1] ** done)) + 1e-8
@@ -71,13 +75,16 @@ class Network:
         return float(np.mean(errors[-max(steps // 10, 1) :]))
 
     def _normalise(self, x: Samples) -> None:
-        """Take the inputs by their mean and deviation; the first layer stays what it was."""
+        """Take the inputs by their mean and deviation; what was fitted before computes the same."""
         mean, deviation = x.mean(axis=0), np.maximum(x.std(axis=0), LEAST_DEVIATION)
+        if not self._is_fitted:
+            self._mean, self._deviation, self._is_fitted = mean, deviation, True
+            return
         self._biases[0] += ((mean - self._mean) / self._deviation) @ self._weights[0]
         self._weights[0] *= (deviation / self._deviation)[:, None]
         self._mean, self._deviation = mean, deviation
 
-    def gradients(self, x: Samples, y: Samples) -> tuple[float, list[Float[np.ndarray, "..."]]]:
+    def gradients(self, x: Samples, y: Labels) -> tuple[float, list[Float[np.ndarray, "..."]]]:
         """Mean square error of normalised inputs, and its gradients: of weights, then biases."""
         layers = self._layers(x)
         off = layers[-1] - y
