@@ -10,7 +10,7 @@ from go2_wbc.lazy import lazy_exports
 if TYPE_CHECKING:
     from controller.policies.cloning import Course, clone
     from controller.policies.policy import Policy
-    from controller.policies.probe import Finding, probe
+    from controller.policies.probing import Finding, probe
     from controller.policies.sidecar import Sidecar
 
 __all__ = ["TROT", "Course", "Finding", "Policy", "Sidecar", "clone", "probe"]

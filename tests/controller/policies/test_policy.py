@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.policies import laid_out
 from controller.policies import TROT, Policy, Sidecar
 from controller.policies.policy import Observer, Player
 from go2_wbc.errors import MissingDependency, PolicyError
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand, RobotState
-from tests.controller.policies.layouts import ISAAC_LAB, SIDECAR, UNITREE, laid_out
+from tests.controller.policies.layouts import ISAAC_LAB, SIDECAR, UNITREE
 from tests.engine_helpers import random_state
 
 COMMAND = VelocityCommand(0.4, -0.1, 0.2)
@@ -43,8 +44,9 @@ def commands(policy: Policy) -> list[JointCommand]:
 def test_a_policy_does_the_same_in_another_order_with_other_signs_and_scales(
     order: np.ndarray, factor: float
 ) -> None:
-    policy, signs = linear(1), np.random.default_rng(2).choice([-1.0, 1.0], size=12)
-    other = laid_out(policy, order, signs, factor)
+    policy, rng = linear(1), np.random.default_rng(2)
+    signs, scales = rng.choice([-1.0, 1.0], size=12), rng.uniform(0.2, 5.0, len(SIDECAR.terms))
+    other = laid_out(policy, order, signs, scales, factor)
     for own, same in zip(commands(policy), commands(other), strict=True):
         for part in ("q_des", "v_des", "tau", "kp", "kd"):
             np.testing.assert_allclose(getattr(own, part), getattr(same, part), atol=ROUNDING)

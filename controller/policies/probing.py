@@ -29,7 +29,7 @@ from controller.policies.cloning import Teacher
 from controller.policies.policy import Player, Policy
 from controller.policies.sidecar import Sidecar
 from go2_wbc.brief import brief
-from go2_wbc.legs import JOINT_NAMES
+from go2_wbc.legs import JOINT_NAMES, LEGS
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.plant import SavedPhysics
@@ -181,9 +181,8 @@ def _orders(side: Sidecar) -> Iterator[Change]:
         numbers = 3 * np.array(legs)[:, None] + np.arange(3)
         for order, told in ((numbers.ravel(), "leg by leg"), (numbers.T.ravel(), "kind by kind")):
             if (order != side.order).any():
-                names = ", ".join(JOINT_NAMES[i].removesuffix("_joint") for i in order[:4])
-                told = f"{names}, ... ({told})"
-                yield Change("joints.order", told, replace(side, order=order))
+                names = ", ".join(LEGS[leg].name for leg in legs)
+                yield Change("joints.order", f"{names}, {told}", replace(side, order=order))
 
 
 def _signs(side: Sidecar) -> Iterator[Change]:

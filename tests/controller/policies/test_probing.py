@@ -1,0 +1,95 @@
+"""A second of a policy says what is wrong with its sidecar, and accuses none that is right."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.policies import laid_out
+from controller.policies import TROT, Policy, probe
+from controller.policies.probing import CLEAR, Change, Track, changes, scaled
+from tests.controller.policies.layouts import ISAAC_LAB, UNITREE
+
+BLIND = ("scale of joint_velocities, 0.5 times that",)
+"""Changes by which the policy hardly walks worse, so that they cannot be seen."""
+
+
+@pytest.fixture(scope="module")
+def policy() -> Policy:
+    return Policy.load(TROT)
+
+
+@pytest.fixture(scope="module")
+def track(policy: Policy) -> Track:
+    return Track(policy.sidecar)
+
+
+def test_nothing_is_changed_twice_and_each_change_is_one(policy: Policy) -> None:
+    side, seen = policy.sidecar, set()
+    for change in changes(side):
+        assert (change.key, change.told) not in seen
+        seen.add((change.key, change.told))
+        other = change.sidecar
+        differ = [
+            (other.order != side.order).any(),
+            (other.signs != side.signs).any(),
+            (other.action_scale != side.action_scale).any(),
+            (other.kp != side.kp).any(),
+            (other.kd != side.kd).any(),
+            *((a.scale != b.scale).any() for a, b in zip(other.terms, side.terms, strict=True)),
+        ]
+        assert sum(map(bool, differ)) == 1
+    assert {order_of(change) for change in changes(side)} > {tuple(ISAAC_LAB), tuple(UNITREE)}
+
+
+def order_of(change: Change) -> tuple[int, ...]:
+    return tuple(change.sidecar.order.tolist())
+
+
+def test_with_anything_changed_by_a_factor_of_2_or_more_it_walks_clearly_worse(
+    policy: Policy, track: Track
+) -> None:
+    right = track.mark(policy)
+    missed = [
+        f"{change.key}, {change.told}"
+        for change in changes(policy.sidecar)
+        if track.mark(Policy("", change.sidecar, policy.network)) < CLEAR * right
+    ]
+    assert tuple(missed) == BLIND
+
+
+@pytest.mark.parametrize("order", [ISAAC_LAB, UNITREE], ids=["isaac-lab", "unitree"])
+def test_a_right_sidecar_has_the_same_mark_in_every_layout(
+    policy: Policy, track: Track, order: np.ndarray
+) -> None:
+    rng = np.random.default_rng(1)
+    signs, scales = rng.choice([-1.0, 1.0], size=12), rng.uniform(0.2, 5.0, 8)
+    other = laid_out(policy, order, signs, scales, 3.0)
+    assert track.mark(other) == pytest.approx(track.mark(policy), rel=0.1)
+
+
+def test_the_probe_names_a_gain_and_what_it_should_be(policy: Policy) -> None:
+    wrong = scaled(policy.sidecar, "action.kp", 3.0).sidecar
+    finding = probe(Policy("wrong", wrong, policy.network))
+    assert not finding
+    assert finding.change is not None
+    np.testing.assert_allclose(finding.change.sidecar.kp, policy.sidecar.kp, rtol=0.3)
+    assert str(finding).startswith("action.kp is wrong: it walks far better with 0.")
+
+
+def test_the_probe_names_the_order_of_another_framework_among_few(
+    policy: Policy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wrong = replace(policy.sidecar, order=UNITREE)
+
+    def few(side: object) -> Iterator[Change]:
+        del side
+        return (c for i, c in enumerate(changes(wrong)) if i % 6 == 0 or order_of(c) == own)
+
+    own = tuple(range(12))
+    monkeypatch.setattr("controller.policies.probing.changes", few)
+    finding = probe(Policy("wrong", wrong, policy.network))
+    assert finding.change is not None
+    assert order_of(finding.change) == own
+    assert "far better with FL, FR, RL, RR, leg by leg" in str(finding)
