@@ -61,12 +61,13 @@ def measure_walk(
     plant = plant_of(trial, FIRST_SEED, UNTOLD)
     if friction is not None:
         plant = MujocoPlant(friction=friction, sensors=trial.sensors, seed=trial.seed)
+    mass = plant.total_mass
     with TrialRobot(plant) as robot:
         set_off(robot, walk, speed)
         robot.wait(START_TIME + WINDOW)
         recorded = robot.truth.recording()
     window = recorded.since(recorded.time[0] + START_TIME)
-    values = measured(Run("", "trot", VelocityCommand(speed), None), window, plant.total_mass)
+    values = measured(Run("", "trot", VelocityCommand(speed), None), window, mass)
     found.values = {name: values[name] for name in ("mean", "mae", "cost", "saturated")}
 
 

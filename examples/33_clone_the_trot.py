@@ -27,14 +27,16 @@ asked = parser.parse_args()
 asked.out.parent.mkdir(parents=True, exist_ok=True)
 meaning = asked.out.with_suffix(".toml")
 shutil.copyfile(TROT.with_suffix(".toml"), meaning)
+stayed_up = 0.0
 for done in clone(Sidecar.load(meaning), Course(asked.rounds, asked.seconds)):
+    stayed_up = done.stayed_up
     print(
         f"round {done.number}: the teacher moves the robot for {done.share:.0%} of the time, it is "
         f"up for {done.stayed_up:.1f} s; {done.samples} samples, {1000 * done.error:.0f} mrad off"
     )
     done.network.save(asked.out)
 
-policy = asked.out if done.stayed_up > 10.0 else TROT
+policy = asked.out if stayed_up > 10.0 else TROT
 print("walks:", policy.name if policy is asked.out else "what a long course has made")
 with GO2Controller() as go2:
     go2.walk(policy=policy)

@@ -63,6 +63,20 @@ class Walking(Behaviour):
 
     def update(self, snapshot: Snapshot) -> Reference | Shared:
         """The planner's reference, and what a policy makes of the command."""
+        reference, learned = self.planned(snapshot), self.learned
+        if learned is None:
+            return reference
+        command = self.asked(snapshot.state.time)
+        target = learned.update(snapshot, reference, command, self._planner)
+        self.label = "policy" if learned.share else Walking.label
+        if learned.refusal:
+            self.refusal, self.command = learned.refusal, ZERO_COMMAND
+        if learned.is_over:
+            self.learned = None
+        return target
+
+    def planned(self, snapshot: Snapshot) -> Reference:
+        """The planner's reference."""
         now = snapshot.state.time
         command = self.asked(now)
         if self.choice is not None:
@@ -83,20 +97,7 @@ class Walking(Behaviour):
             if blocked and not self._told_block:
                 _log.warning("stopped: %s", blocked)
             self._told_block = blocked
-        if self.learned is None:
-            return reference
-        return self._shared(self.learned, snapshot, reference, command)
-
-    def _shared(
-        self, learned: Learned, snapshot: Snapshot, reference: Reference, command: VelocityCommand
-    ) -> Reference | Shared:
-        target = learned.update(snapshot, reference, command, self._planner)
-        self.label = "policy" if learned.share else Walking.label
-        if learned.refusal:
-            self.refusal, self.command = learned.refusal, ZERO_COMMAND
-        if learned.is_over:
-            self.learned = None
-        return target
+        return reference
 
     def square_up(self, snapshot: Snapshot) -> bool:
         """Step in place unless the feet are below the hips; returns whether they are."""

@@ -160,7 +160,7 @@ class Lesson:
         plant, rng, side = self._plant, self._rng, self._side
         ticks = round(1.0 / (side.rate * plant.control_period))
         command, changes, pushed, turns = draw(side, rng), 0.0, rng.uniform(*PAUSE), 0.0
-        start = now = plant.time
+        start, teaches = plant.time, True
         while (now := plant.time - start) < seconds:
             if now >= changes:
                 command, changes = draw(side, rng), now + rng.uniform(*STEADY)
@@ -202,6 +202,7 @@ class Lesson:
 def draw(side: Sidecar, rng: np.random.Generator) -> VelocityCommand:
     """A command that the policy shall follow; every other one is straight, or does not turn."""
     ranges = side.commands
-    x, y, turn = rng.uniform(*zip(ranges.forward, ranges.lateral, ranges.turning, strict=True))
+    low, high = zip(ranges.forward, ranges.lateral, ranges.turning, strict=True)
+    x, y, turn = rng.uniform(low, high).tolist()
     aside, turns = rng.random(2) < 0.5
-    return VelocityCommand(float(x), float(y) * aside, float(turn) * turns)
+    return VelocityCommand(x, y * aside, turn * turns)

@@ -21,7 +21,8 @@ LEAST_DEVIATION = 1e-3
 """Of an input: what never changes is not blown up."""
 BATCH = 512
 
-Samples, Labels = Float[np.ndarray, "k n"], Float[np.ndarray, "k m"]
+Samples = Float[np.ndarray, "k n"]
+Labels = Float[np.ndarray, "k m"]
 
 
 class Network:

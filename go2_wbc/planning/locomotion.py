@@ -394,7 +394,7 @@ class LocomotionPlanner:
         clock, ground = self._state.clock, self._state.ground
         for leg in np.flatnonzero(landed).tolist():
             ahead = (clock.time / clock.period - clock.offsets[leg] + 0.5) % 1.0 - 0.5
-            clock.time = (clock.time - share * ahead * clock.period) % clock.period
+            clock.time = float(clock.time - share * ahead * clock.period) % clock.period
         ground.rough_way = ground.high_way = ground.ramp_way = 0.0
 
     @property

@@ -55,7 +55,7 @@ def test_a_policy_does_the_same_in_another_order_with_other_signs_and_scales(
 def test_an_observation_holds_each_term_by_its_meaning() -> None:
     state, observer = states(1)[0], Observer(replace(SIDECAR, order=ISAAC_LAB))
     observer.restart(0.3)
-    observer.action = np.arange(12.0)
+    observer.action = np.arange(12).astype(float)
     row = observer.observe(state, COMMAND)
     parts = np.split(row, np.cumsum([len(term.scale) for term in SIDECAR.terms])[:-1])
     assert (parts[0] == state.v[:3]).all()
