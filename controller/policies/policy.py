@@ -88,7 +88,7 @@ class Policy:
         network: from an observation to an action.
     """
 
-    @typed("network", error=PolicyError)
+    @typed(error=PolicyError)
     def __init__(self, name: str, sidecar: Sidecar, network: Network) -> None:
         """A policy of any network; ``load`` makes one of a file."""
         self.name, self.sidecar, self.network = name, sidecar, network
@@ -99,6 +99,7 @@ class Policy:
         return f"<Policy {self.name}: {side.rate:g} Hz, {side.observation_size} numbers in>"
 
     @staticmethod
+    @typed(error=PolicyError)
     def load(path: Path | str, sidecar: Sidecar | Path | str | None = None) -> Policy:
         """The policy of an ONNX file.
 

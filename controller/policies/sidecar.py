@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.errors import PolicyError, unknown_name
 from go2_wbc.legs import JOINT_NAMES
@@ -157,6 +158,7 @@ class Sidecar:
         return self.history * self.row_size
 
     @staticmethod
+    @typed(error=PolicyError)
     def load(path: Path | str) -> Sidecar:
         """Read the sidecar ``path``.
 

@@ -2,17 +2,22 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from controller import GO2Controller, Mode
 from controller.behaviours.learned import HAND_OVER
-from controller.policies import TROT, Policy
+from controller.behaviours.walking import Walking
+from controller.policies import TROT, Policy, probe
 from go2_wbc.errors import CommandError, PolicyError
+from go2_wbc.legs import Leg
+from go2_wbc.planning.locomotion import LocomotionPlanner
 from go2_wbc.plant import MujocoPlant
 from tests.controller.plants import WatchedPlant
 
+OTHERS = sorted((Path(__file__).parent / "policies/others").glob("*.onnx"))
 SPEED = 0.5  # m/s
 STRIDE = 0.36  # s, of the cloned trot
 PHASES = 20
@@ -170,3 +175,41 @@ def test_a_policy_of_another_robot_and_a_thing_that_is_none_are_refused(
     with pytest.raises(CommandError, match="policy"):
         go2.walk(policy=3)  # type: ignore[arg-type]
     assert go2.mode is Mode.LYING
+
+
+@pytest.mark.parametrize("path", [TROT, *OTHERS], ids=lambda path: path.stem)
+def test_a_policy_of_anybody_walks_hands_over_and_is_not_accused(
+    path: Path, go2: GO2Controller
+) -> None:
+    assert go2.walk(policy=path)
+    go2.move(SPEED)
+    go2.wait(1.5)
+    before = go2.state.p_world_base.copy()
+    go2.wait(3.0)
+    speed = np.linalg.norm(go2.state.p_world_base - before) / 3.0
+    assert speed == pytest.approx(SPEED, rel=2.0 * SLACK)
+    assert go2.walk()
+    go2.wait(1.0)
+    assert go2.mode is Mode.WALKING
+    assert probe(Policy.load(path))
+
+
+def test_the_shadow_of_a_policy_keeps_in_step_with_its_feet(policy: Policy) -> None:
+    plant, phases, contact = MujocoPlant(), [], [True, True]
+    planner: LocomotionPlanner | None = None
+
+    def look() -> None:
+        contact[:] = contact[1], bool(plant.truth().feet_in_contact[Leg.FL])
+        if planner is not None and contact == [False, True]:
+            phases.append((planner.phase + 0.5) % 1.0 - 0.5)
+
+    with GO2Controller(plant=plant, after_tick=look) as go2:
+        assert go2.walk(policy=policy)
+        go2.move(SPEED)
+        go2.wait(1.5)
+        behaviour = go2._runner.loop.behaviour
+        assert isinstance(behaviour, Walking)
+        planner = behaviour._planner
+        go2.wait(4.0)
+    assert len(phases) > 8
+    assert np.abs(phases).max() < 0.1
