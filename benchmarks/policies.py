@@ -60,7 +60,8 @@ def measure_walk(
     """Follow the command; see ``locomotion`` for what is measured."""
     plant = plant_of(trial, FIRST_SEED, UNTOLD)
     if friction is not None:
-        plant = MujocoPlant(friction=friction, sensors=trial.sensors, seed=trial.seed)
+        mass = float(np.random.default_rng(FIRST_SEED + trial.seed).uniform(*UNTOLD))
+        plant = MujocoPlant(friction=friction, mass_scale=mass, sensors=trial.sensors)
     mass = plant.total_mass
     with TrialRobot(plant) as robot:
         set_off(robot, walk, speed)

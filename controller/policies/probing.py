@@ -43,8 +43,9 @@ UNITS = np.array([0.1, 0.1, 0.2, 0.1, 0.3, 0.05])
 """Of a mark: velocity ahead and aside [m/s], turning [rad/s], bouncing [m/s], rolling and pitching
 [rad/s], tilt [rad]."""
 FALL = 10.0  #: Mark of a fall at the end of the second; twice that for one at once
-FACTORS = (0.1, 0.25, 0.5, 2.0, 4.0, 10.0)
-FINER = (0.6, 0.8, 1.25, 1.6)  #: What is tried around the best factor
+FACTORS = (0.1, 0.16, 0.25, 0.4, 0.63, 1.6, 2.5, 4.0, 6.3, 10.0)
+"""A policy falls if it is told 1.5 times the gravity: coarser ones would miss what is right."""
+FINER = (0.8, 0.9, 1.12, 1.25)  #: What is tried around the best factor
 CLEAR = 1.4
 """By how many times the mark must be better with something changed, for it to be named."""
 
@@ -85,11 +86,13 @@ class Finding:
     __repr__ = brief
 
     def __bool__(self) -> bool:
-        """Whether nothing is found to be wrong."""
-        return self.change is None
+        """Whether nothing is found to be wrong: it walks, and nothing changed makes it better."""
+        return self.change is None and self.mark < FALL
 
     def __str__(self) -> str:
         """In plain words."""
+        if self.change is None and not self:
+            return "it falls, whatever one thing is changed: more is wrong, or it cannot walk"
         if self.change is None:
             return f"nothing wrong is seen (mark {self.mark:.2g})"
         return (
@@ -114,7 +117,7 @@ def probe(policy: Policy) -> Finding:
     if best.factor:
         finer = [scaled(policy.sidecar, best.key, best.factor * factor) for factor in FINER]
         mark, best = min([(mark, best), *((marked(f), f) for f in finer)], key=lambda item: item[0])
-    is_clear = given > CLEAR * mark
+    is_clear = given > CLEAR * mark and mark < FALL
     return Finding(given, min(given, mark), best if is_clear else None)
 
 
