@@ -18,7 +18,7 @@ from statistics import median
 
 import numpy as np
 
-from benchmarks import speed_solves, speed_ticks
+from benchmarks import speed_learning, speed_solves, speed_ticks
 from benchmarks.command import Benchmark
 from benchmarks.store import ROOT
 from benchmarks.study import Study, TrialResult
@@ -148,12 +148,15 @@ STUDIES = (
     Study("sight", speed_ticks.SIGHT, speed_ticks.measure_sight),
     Study("checks", CHECKS, measure_checks, ""),
     Study("startup", STARTED, measure_startup),
+    Study("environments", speed_learning.ENVIRONMENTS_TABLE, speed_learning.measure_environments),
+    Study("dataset", speed_learning.DATASET_TABLE, speed_learning.measure_dataset),
     Study("realtime", speed_ticks.REALTIME, speed_ticks.measure_realtime),
 )
 BENCHMARK = Benchmark(
     "speed",
     "Processor time of the whole-body QP beside PlaCo's on the same states in turn,\n"
-    "of whole ticks with 2 ms of physics, of checking a motion, of starts; and ticks\n"
+    "of whole ticks with 2 ms of physics, of checking a motion, of starts, of\n"
+    "environments and data sets for learners (extra [learning]); and ticks\n"
     "late at the pace of the wall clock. Wants an idle machine.",
     STUDIES,
     takes="ten minutes",

@@ -22,6 +22,8 @@ from go2_wbc.robot.state import JointCommand, RobotState
 
 RATE = 50.0
 """Actions a second: what most published policies of the Go2 run at (legged_gym, Isaac Lab)."""
+KP, KD = 40.0, 1.0
+"""Of the joints' servo [N m/rad], [N m s/rad]; published policies have 20 to 40 and 0.5 to 1."""
 STANCE = (0.0, 0.8, -1.6)
 """Angles [rad] of hip, thigh and calf from which targets count: feet below the hips."""
 STANCE_HEIGHT = 0.32  #: of the base [m] in that stance, on soles that just touch
@@ -180,8 +182,8 @@ class Actuation:
 
     kind: str
     torque_limits: Array12
-    kp: float = 40.0
-    kd: float = 1.0
+    kp: float = KP
+    kd: float = KD
     stance: tuple[float, ...] = STANCE * 4
     reach: float = 1.0
 
@@ -194,11 +196,12 @@ class Actuation:
 
     def command(self, action: Float[np.ndarray, "12"]) -> JointCommand:
         """What the motors are told for an action; what is beyond 1 is cut."""
-        action = np.clip(action.astype(float), -1.0, 1.0)
+        action, zeros = np.clip(action.astype(float), -1.0, 1.0), np.zeros(12)
         if self.kind == TORQUES:
             return JointCommand.torque(action * self.torque_limits)
         targets = np.array(self.stance) + self.reach * action
-        return JointCommand.servo(targets, np.zeros(12), self.kp, self.kd)
+        gains = np.full(12, self.kp), np.full(12, self.kd)
+        return JointCommand(zeros, targets, zeros, *gains)
 
     def action(self, meant: Float[np.ndarray, "*n 12"]) -> Float32[np.ndarray, "*n 12"]:
         """The action that comes nearest to joint targets [rad], or torques [N m]."""

@@ -198,6 +198,7 @@ EXTRAS: Mapping[str, str] = {
     "cluster": "sweeps on many machines",
     "policies": "learned policies: walk(policy=...), in ONNX files",
     "gamepad": "a gamepad for teleop",
+    "learning": "Gymnasium's environments, data sets",
     "mcap": "recordings as MCAP files, for Foxglove",
     "rerun": "recordings as rrd files, for Rerun (490 MB)",
     "examples": "what some examples show their point with",

@@ -53,6 +53,7 @@ COMMANDS = tuple(
         ("check", "motions:check", "can the robot do this motion?"),
         ("completion", "main:completion", "what a shell needs to complete this on TAB"),
         ("dance", "dance", "a dance on the beats of a song"),
+        ("dataset", "dataset", "what the controller does, recorded for learners"),
         ("demo", "demo", "stand, sit, walk, turn, high five; measured, in 3D"),
         ("doctor", "doctor", "check this installation, say what is missing"),
         ("export", "motions:export", "a motion's trajectory as NumPy or CSV"),

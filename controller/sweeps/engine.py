@@ -119,15 +119,26 @@ def order_of(function: Callable[[Any], Any]) -> bytes:
 
 
 def answer(order: bytes, item: bytes) -> bytes:
+    """The ``reply``, and nothing of what it took."""
+    try:
+        return reply(order, item)
+    finally:
+        tidy_up()
+
+
+def reply(order: bytes, item: bytes) -> bytes:
     """The message that says what came of an item: the value, or the ``Failure``."""
     try:
         return pickle.dumps((_ordered(order)(pickle.loads(item)), None))
     except (Exception, SystemExit) as error:
         text = traceback.format_exception_only(error)[-1].strip()
         return pickle.dumps((None, Failure(text, _told(error))))
-    finally:  # of what it has left: robots hold tens of megabytes of records, in cycles
-        gc.collect()
-        _keep_the_rest()
+
+
+def tidy_up() -> None:
+    """Free what an item has left: robots hold tens of megabytes of records, in cycles."""
+    gc.collect()
+    _keep_the_rest()
 
 
 def _told(error: BaseException) -> str:
@@ -173,7 +184,20 @@ def serve(pipe: Connection, order: bytes, environment: Mapping[str, str]) -> Non
         random.seed()  # Python's own numbers are seeded anew by a fork
     with suppress(EOFError):
         while True:
-            pipe.send_bytes(answer(order, pipe.recv_bytes()))
+            pipe.send_bytes(reply(order, awaited(pipe)))
+            tidy_up()  # while nobody waits
+
+
+def awaited(pipe: Connection) -> bytes:
+    """What comes through ``pipe``; a short while it is looked for without falling asleep.
+
+    Raises:
+        EOFError: if the other end is closed.
+    """
+    latest = time.perf_counter() + AWAKE
+    while not pipe.poll() and time.perf_counter() < latest:
+        pass
+    return pipe.recv_bytes()
 
 
 def _end_with_parent() -> None:
@@ -184,6 +208,8 @@ def _end_with_parent() -> None:
 
 ATTEMPTS = 2
 """How often an item is tried whose worker dies: the first time it may have been anything."""
+AWAKE = 3e-4
+"""Time [s] for which what comes at once is waited for awake: to wake a processor takes 0.05 ms."""
 DYING = 0.2
 """Time [s] after which a server of processes that has been killed has ended, and another starts."""
 LOADED = ("controller.sweeps.motion_study",)
@@ -279,6 +305,12 @@ class Worker:
         with suppress(EOFError, OSError):
             if self._pipe.poll():
                 return self._pipe.recv_bytes()
+        return None
+
+    def wait(self) -> bytes | None:
+        """What comes of the item, as soon as it does; None if the worker has ended."""
+        with suppress(EOFError, OSError):
+            return awaited(self._pipe)
         return None
 
     def end(self) -> str:

@@ -33,7 +33,7 @@ from go2_wbc.wbc.config import Gains
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("go2_wbc", "motions", "viz", "controller")
-OFFERED = (*PACKAGES, "motions.music")
+OFFERED = (*PACKAGES, "motions.music", "controller.learning")
 """Packages whose public names programs use; of those that two of them offer the first one tells."""
 LEFT_OUT = ("controller/cli", "controller/bridges", "motions/library")
 """Described on other pages: the command line, ROS 2 and Unitree, the gallery."""

@@ -1,6 +1,7 @@
 """What a learner sees and does: order, units, limits, and actions that mean what they say."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -105,10 +106,20 @@ def test_targets_are_pursued_by_the_servo_and_torques_by_none() -> None:
         Actuation("speeds", LIMITS)
 
 
+def test_the_page_for_learners_names_every_term_with_its_size_and_units() -> None:
+    page = Path(__file__).parents[2].joinpath("docs/how-to/learning.md").read_text("utf-8")
+    for term in OBSERVATION.terms:
+        units = ", ".join(term.units if len(set(term.units)) > 1 else term.units[:1])
+        assert f"| `{term.name}` | {term.size} | {units} |" in page
+    assert f"\n{OBSERVATION.size} numbers" in page
+
+
 def test_in_the_stance_the_feet_touch_the_ground_below_the_hips() -> None:
     model = RobotModel()
     q = np.array([0.0, 0.0, STANCE_HEIGHT, 0.0, 0.0, 0.0, 1.0, *STANCE * 4])
-    feet = model.snapshot(RobotState(0.0, q, *map(np.zeros, (18, 12, 4)), np.zeros(4) > 0.0))
+    feet = model.snapshot(
+        RobotState(0.0, q, np.zeros(18), np.zeros(12), np.zeros(4), np.zeros(4) > 0.0)
+    )
     soles = feet.p_world_feet[:, 2] - feet.foot_radius
     assert np.abs(soles).max() < 0.005
     assert np.abs(feet.p_world_feet[:, 0] - model.p_base_hips[:, 0]).max() < 0.03

@@ -97,6 +97,19 @@ def bin_forces(
             forces[which] += efc_force[row]
 
 
+def ground_forces(
+    data: mujoco.MjData, codes: Int[np.ndarray, " ngeom"], is_elliptic: bool
+) -> Float[np.ndarray, "6"]:
+    """Normal forces [N] of contacts with anything but the robot, summed per bin of the layout.
+
+    Valid between ``mj_step2`` and the next ``mj_step1``: they acted over the last step.
+    """
+    contact, forces = data.contact, np.empty(ROBOT_BINS)
+    rows = (contact.geom, contact.efc_address, contact.dim, data.efc_force)
+    bin_forces(*rows, codes, is_elliptic, forces)
+    return forces
+
+
 @dataclass(frozen=True, slots=True)
 class MujocoLayout:
     """Index tables of one compiled model."""

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections import deque
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import NoReturn
 
@@ -24,13 +23,14 @@ from go2_wbc.plant.mujoco.forces import (
     Contacts,
     FootContacts,
     Pushes,
-    bin_forces,
     foot_contacts,
+    ground_forces,
     read_joints,
 )
 from go2_wbc.plant.mujoco.lidar import DepthConfig, LidarConfig, RangeSensor, chosen
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
 from go2_wbc.plant.mujoco.setup import PlantSetup, SavedPhysics, prepare, settle
+from go2_wbc.plant.mujoco.variation import DelayedCommands, Variation
 from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors, SensorNoise
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.records import packed
@@ -39,7 +39,7 @@ from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel, drive
 from go2_wbc.robot.state import JointCommand, OdometryCovariance, PartFault, RobotState
-from go2_wbc.world import SENSORS
+from go2_wbc.world import SENSORS, World
 
 _logger = logging.getLogger(__name__)
 
@@ -79,7 +79,7 @@ class MujocoPlant(Plant):
         urdf: another URDF instead of the installed one.
         robot: name of its profile: "go2", "a1" or "go1".
         visuals: also load the visual meshes (slower), for the viewer and for rendering.
-        delay: time [s] after which a command acts, rounded to whole control periods.
+        delay: time [s] after which a command acts, rounded to whole physics steps.
         lidar: whether it has one, or its numbers; only without ``mjcf``.
         depth: the same of a depth camera that looks ahead, in its place.
 
@@ -154,8 +154,7 @@ class MujocoPlant(Plant):
         self._noise = (noise or SensorNoise()) if sensors == "noisy" else None
         self._period, self._substeps = control_period, round(control_period / timestep)
         self._closed, self._ticks = False, 0
-        self._late, self._acting = round(delay / control_period), np.zeros((5, 12))
-        self._waiting: deque[Float[np.ndarray, "5 12"]] = deque()  # commands that do not act yet
+        self._commands = DelayedCommands(self._substeps, round(delay / timestep))
         self._faults = Faults(self._description)
         self._pushes = Pushes(self._model, self._data, self._layout)
         # Views into MuJoCo's memory, made once because making them is slow.
@@ -255,22 +254,20 @@ class MujocoPlant(Plant):
             ClosedError: after ``close()``.
         """
         self._check_open()
-        self._waiting.append(command.numbers())
-        if len(self._waiting) > self._late:
-            self._acting = self._waiting.popleft()
+        self._commands.write(command.numbers())
         model, data = self._model, self._data
         total, shares = np.zeros(12), None
         if self._faults.known:
             shares = self._faults.torque_shares(self.time)
             for hold in self._faults.begun_holds(self.time, self._period):
                 self._pushes.hold(hold.part, hold.value, HELD_TIME)
-        for remaining in range(self._substeps, 0, -1):
-            drive(self._acting, *self._motors, total)
+        for step in range(self._substeps):
+            drive(self._commands.acting(step), *self._motors, total)
             if shares is not None:
                 data.ctrl[self._layout.motors] *= shares
             self._pushes.apply()
             mujoco.mj_step2(model, data)
-            if remaining == 1:
+            if step == self._substeps - 1:
                 self._forces = self._ground_forces()
             mujoco.mj_step1(model, data)
         self._tau = total / self._substeps if shares is None else total * shares / self._substeps
@@ -370,6 +367,20 @@ class MujocoPlant(Plant):
             self._faults.watch.restart()
         self._sense()
 
+    @typed("world")
+    def vary(self, world: World) -> None:
+        """Puts the robot into another world, as if it had been built there; time stands still.
+
+        Payload and sensors stay. Commands on their way are lost.
+
+        Raises:
+            ConfigError: for another payload.
+        """
+        self._check_open()
+        self._variation.apply(world)
+        self._commands.delay(round(world.delay / self._model.opt.timestep))
+        mujoco.mj_step1(self._model, self._data)
+
     @property
     def p_world_feet(self) -> Float[np.ndarray, "4 3"]:
         """Centres of the feet in the world [m]."""
@@ -410,7 +421,7 @@ class MujocoPlant(Plant):
             integration=integration,
             ticks=self._ticks,
             pushes=self._pushes.active,
-            waiting=tuple(self._waiting),
+            commands=self._commands.save(),
             tau=self._tau,
             forces=self._forces,
             noise_state=self._rng.bit_generator.state,
@@ -431,7 +442,7 @@ class MujocoPlant(Plant):
         self._warnings[:] = 0
         self._ticks = saved.ticks
         self._pushes.active = saved.pushes
-        self._waiting = deque(saved.waiting)
+        self._commands.restore(*saved.commands)
         self._tau, self._forces = saved.tau, saved.forces
         self._rng.bit_generator.state = dict(saved.noise_state)
         self._truth, self._state, self._imu = None, saved.state, saved.imu
@@ -453,6 +464,10 @@ class MujocoPlant(Plant):
     def __reduce__(self) -> NoReturn:
         """A simulation is no value: it cannot be pickled or copied."""
         raise TypeError("a MujocoPlant holds a running simulation: make one in each process")
+
+    @cached_property
+    def _variation(self) -> Variation:
+        return Variation(self._model, self._layout.joint_v)
 
     def _check_open(self) -> None:
         if self._closed:
@@ -481,15 +496,5 @@ class MujocoPlant(Plant):
         state = (data.qpos, data.qvel, self._R_world_base)
         base = (layout.base_q.start, layout.base_v.start)
         self._read_joints = partial(read_joints, *state, *base, places)
-        self._is_elliptic = bool(self._model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC)
-
-    def _ground_forces(self) -> Float[np.ndarray, "6"]:
-        """Normal forces [N] of contacts with anything but the robot, summed per bin of the layout.
-
-        Valid between ``mj_step2`` and the next ``mj_step1``: they acted over the last step.
-        """
-        data, forces = self._data, np.empty(ROBOT_BINS)
-        contact, codes = data.contact, self._layout.geom_codes
-        rows = (contact.geom, contact.efc_address, contact.dim, data.efc_force)
-        bin_forces(*rows, codes, self._is_elliptic, forces)
-        return forces
+        is_elliptic = bool(self._model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC)
+        self._ground_forces = partial(ground_forces, data, layout.geom_codes, is_elliptic)

@@ -107,7 +107,7 @@ class SavedPhysics(NamedTuple):
     integration: Float[np.ndarray, " n"]
     ticks: int
     pushes: tuple[Push, ...]
-    waiting: tuple[Float[np.ndarray, "5 12"], ...]
+    commands: tuple[int, tuple[Float[np.ndarray, "5 12"], ...]]
     tau: Float[np.ndarray, "12"]
     forces: Float[np.ndarray, "6"]
     noise_state: Mapping[str, Any]

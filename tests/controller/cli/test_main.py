@@ -29,6 +29,7 @@ NEEDED = {
     "completion": "bash",
     "certify": "bow",
     "dance": "song.wav",
+    "dataset": "walk.parquet",
     "export": "bow --out bow.csv",
     "new": "greet",
     "preview": "bow",
