@@ -36,11 +36,15 @@ class Walker:
         if not (excess := self._envelope.excess(command)):
             return 0, ""
         name = self.walking.gait.name if self.walking.choice is None else AUTO
-        whose = f"gait {name!r}"
-        if (learned := self.walking.learned) is not None and learned.is_wanted:
-            whose = f"policy {learned.policy.name}"
+        whose = f"gait {name!r}" if self._policy is None else f"policy {self._policy.name}"
         told = f"{excess}; the envelope of {whose} is {self._envelope}"
         return 1 + self._envelope.is_far(command), told
+
+    @property
+    def _policy(self) -> Policy | None:
+        """What walks when there is a command, if it is learned."""
+        learned = self.walking.learned
+        return learned.policy if learned is not None and learned.is_wanted else None
 
     @property
     def command(self) -> VelocityCommand:
@@ -135,10 +139,13 @@ class Walker:
             pose: wanted of the trunk; None keeps the one that is followed.
 
         Raises:
-            CommandError: if the pose is beyond its envelope; nothing is followed then.
+            CommandError: if the pose is beyond its envelope, or a policy walks, which takes none;
+                nothing is followed then.
         """
         if pose is not None:
             self._config.pose.require(pose)
+            if pose != LEVEL and self._policy is not None:
+                raise CommandError(f"policy {self._policy.name} takes no pose of the trunk")
             self.walking.pose = pose
         self.walking.command = self._envelope.clip(command)
         return self.walking.command

@@ -159,8 +159,10 @@ def test_commands_are_kept_within_what_the_policy_was_trained_on(
     assert walking.command.linear_x == 1.0
     assert walking.command.angular_z == 0.2
     assert "the envelope of policy trot.onnx is -0.2 to 1 m/s ahead" in caplog.text
+    with pytest.raises(CommandError, match=r"policy trot\.onnx takes no pose of the trunk"):
+        walking.move(0.3, height=-0.03)
     assert walking.walk()
-    walking.move(1.3)
+    walking.move(1.3, height=-0.03)
     assert walking.command.linear_x == 1.3
 
 
