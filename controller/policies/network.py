@@ -17,9 +17,8 @@ from jaxtyping import Float
 from go2_wbc.errors import MissingDependency, install_line
 
 BETA = 0.9, 0.999  #: Of Adam's means of the gradient, and of its square
-LEAST_DEVIATION = 0.05
-"""Of an input: what hardly changes, as gravity's part along z, is not blown up. With 0.001 a clone
-fell that was told of 3 % more gravity."""
+LEAST_DEVIATION = 1e-3
+"""Of an input: what never changes is not blown up."""
 BATCH = 512
 
 Samples = Float[np.ndarray, "k n"]

@@ -11,9 +11,6 @@ from controller.policies import TROT, Policy, probe
 from controller.policies.probing import CLEAR, Change, Track, changes, scaled
 from tests.controller.policies.layouts import ISAAC_LAB, UNITREE
 
-BLIND = ("scale of joint_velocities, 0.5 times that",)
-"""Changes by which the policy hardly walks worse, so that they cannot be seen."""
-
 
 @pytest.fixture(scope="module")
 def policy() -> Policy:
@@ -54,9 +51,10 @@ def test_with_anything_changed_by_a_factor_of_2_or_more_it_walks_clearly_worse(
     missed = [
         f"{change.key}, {change.told}"
         for change in changes(policy.sidecar)
-        if track.mark(Policy("", change.sidecar, policy.network)) < CLEAR * right
+        if not 0.5 < change.factor < 2.0
+        and track.mark(Policy("", change.sidecar, policy.network)) < CLEAR * right
     ]
-    assert tuple(missed) == BLIND
+    assert missed == []
 
 
 @pytest.mark.parametrize("order", [ISAAC_LAB, UNITREE], ids=["isaac-lab", "unitree"])
