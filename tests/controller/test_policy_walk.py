@@ -180,9 +180,7 @@ def test_a_policy_of_another_robot_and_a_thing_that_is_none_are_refused(
 
 
 @pytest.mark.parametrize("path", [TROT, *OTHERS], ids=lambda path: path.stem)
-def test_a_policy_of_anybody_walks_hands_over_and_is_not_accused(
-    path: Path, go2: GO2Controller
-) -> None:
+def test_a_policy_of_anybody_walks_and_hands_over(path: Path, go2: GO2Controller) -> None:
     assert go2.walk(policy=path)
     go2.move(SPEED)
     go2.wait(1.5)
@@ -193,6 +191,10 @@ def test_a_policy_of_anybody_walks_hands_over_and_is_not_accused(
     assert go2.walk()
     go2.wait(1.0)
     assert go2.mode is Mode.WALKING
+
+
+@pytest.mark.parametrize("path", OTHERS, ids=lambda path: path.stem)
+def test_a_policy_of_others_is_not_accused(path: Path) -> None:
     assert probe(Policy.load(path))
 
 

@@ -1,13 +1,12 @@
 """A second of a policy says what is wrong with its sidecar, and accuses none that is right."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from benchmarks.policies import laid_out
-from controller.policies import TROT, Policy, probe
+from controller.policies import TROT, Policy, Sidecar, probe
 from controller.policies.probing import CLEAR, Change, Track, changes, scaled
 from tests.controller.policies.layouts import ISAAC_LAB, UNITREE
 
@@ -67,6 +66,22 @@ def test_a_right_sidecar_has_the_same_mark_in_every_layout(
     assert track.mark(other) == pytest.approx(track.mark(policy), rel=0.1)
 
 
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of what is changed each seventh, and all gains and orders leg by leg: the rest takes long."""
+
+    def chosen(side: Sidecar) -> list[Change]:
+        kept = ("action.kp", "action.kd")
+        return [
+            change
+            for i, change in enumerate(changes(side))
+            if i % 7 == 0 or change.key in kept or change.told.endswith("leg by leg")
+        ]
+
+    monkeypatch.setattr("controller.policies.probing.changes", chosen)
+
+
+@pytest.mark.usefixtures("few")
 def test_the_probe_names_a_gain_and_what_it_should_be(policy: Policy) -> None:
     wrong = scaled(policy.sidecar, "action.kp", 3.0).sidecar
     finding = probe(Policy("wrong", wrong, policy.network))
@@ -76,18 +91,21 @@ def test_the_probe_names_a_gain_and_what_it_should_be(policy: Policy) -> None:
     assert str(finding).startswith("action.kp is wrong: it walks far better with 0.")
 
 
-def test_the_probe_names_the_order_of_another_framework_among_few(
-    policy: Policy, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("few")
+def test_the_probe_names_the_order_of_another_framework(policy: Policy) -> None:
     wrong = replace(policy.sidecar, order=UNITREE)
-
-    def few(side: object) -> Iterator[Change]:
-        del side
-        return (c for i, c in enumerate(changes(wrong)) if i % 6 == 0 or order_of(c) == own)
-
-    own = tuple(range(12))
-    monkeypatch.setattr("controller.policies.probing.changes", few)
     finding = probe(Policy("wrong", wrong, policy.network))
     assert finding.change is not None
-    assert order_of(finding.change) == own
+    assert order_of(finding.change) == tuple(range(12))
     assert "far better with FL, FR, RL, RR, leg by leg" in str(finding)
+
+
+@pytest.mark.usefixtures("few")
+def test_a_policy_that_cannot_walk_is_not_called_right_and_nothing_is_named(
+    policy: Policy,
+) -> None:
+    folded = Policy("folded", policy.sidecar, lambda _: np.tile([0.0, 4.0, -4.0], 4))
+    finding = probe(folded)
+    assert not finding
+    assert finding.change is None
+    assert str(finding).startswith("it falls, whatever one thing is changed")
