@@ -14,6 +14,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("locomotion", "benchmarks.locomotion", "gaits at their speeds"),
     Command("envelopes", "benchmarks.envelopes", "the greatest speed of each gait, and store it"),
     Command("balance", "benchmarks.balance", "pushes, drops, gait changes; falls noticed"),
+    Command("policies", "benchmarks.policies", "the cloned trot; hand-overs; wrong sidecars named"),
     Command("combined", "benchmarks.combined", "coming to rest; worlds hard in several ways"),
     Command("rough", "benchmarks.rough", "stairs, blocks, slopes, waves, blind; reversals"),
     Command("faults", "benchmarks.faults", "broken parts: named in time, and outlived"),

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from controller.policies.policy import Policy
 from go2_wbc.config import Config, load_config
-from go2_wbc.errors import CommandError, ConfigError
+from go2_wbc.errors import CommandError, ConfigError, PolicyError
 from go2_wbc.planning.command import finite_number
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.description import GO2
@@ -61,3 +62,15 @@ def config(
         told = ", ".join(f"{what} says {name!r}" for what, name in known.items() if name)
         raise ConfigError(f"of which robot? {told}; Config.of_robot(...) has a robot's numbers")
     return value
+
+
+def policy(value: Policy | Path | str, plant: Plant) -> Policy:
+    """The policy meant: itself, or that of an ONNX file and its sidecar.
+
+    Raises:
+        PolicyError, MissingDependency: see ``Policy.load``; also for another robot's.
+    """
+    meant = value if isinstance(value, Policy) else Policy.load(value)
+    if (robot := meant.sidecar.robot) != plant.robot:
+        raise PolicyError(f"policy {meant.name} is for {robot}, the plant is {plant.robot}")
+    return meant

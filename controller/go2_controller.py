@@ -6,7 +6,7 @@ import logging
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import NoReturn
@@ -14,9 +14,10 @@ from typing import NoReturn
 import motions  # what is named motions.X below is imported when it is used, scipy with it
 from controller import arguments
 from controller.assembly import build_pilot
-from controller.modes import Aborted, Measurements, Mode, Outcome
+from controller.modes import Aborted, Call, Measurements, Mode, Outcome
 from controller.navigation import DriveStraight, TurnInPlace
 from controller.pacing import REASON, LogOnce
+from controller.policies.policy import Policy
 from controller.telemetry import SeenTerrain, Telemetry
 from go2_wbc.arguments import typed
 from go2_wbc.config import Config
@@ -34,12 +35,6 @@ from go2_wbc.wbc.explanation import Explanation
 from go2_wbc.wbc.tasks import Task
 
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Call:
-    name: str
-    start: float
 
 
 class GO2Controller:
@@ -117,7 +112,7 @@ class GO2Controller:
         self._runner, self._description = self._pilot.runner, description
         self._motor, self._limits = config.motor, config.feasibility
         self._closed, self._clipped, self._planning = False, LogOnce(_log), threading.Lock()
-        self._turn: dict[str, _Call] = {}  # what runs: one entry, or none
+        self._turn: dict[str, Call] = {}  # what runs: one entry, or none
         self._last = Outcome(True, "lying, nothing asked yet", 0.0)
 
     # --- postures -------------------------------------------------------------------------
@@ -149,19 +144,25 @@ class GO2Controller:
 
     # --- walking --------------------------------------------------------------------------
 
-    @typed(error=CommandError)
-    def walk(self, gait: Gait | str = "trot") -> bool:
+    @typed("policy", error=CommandError)
+    def walk(self, gait: Gait | str = "trot", *, policy: Path | Policy | str | None = None) -> bool:
         """Enter walking mode; the robot stands ready until ``move``. Stands up first if needed.
 
         One that walks already passes over into the gait, its command clipped into the envelope.
 
         Args:
             gait: name of a gait, "auto" for one by the speed, or a gait of your own.
+            policy: a learned one, by its ONNX file, beside which lies its sidecar: it walks while
+                there is a command. Without one the gait lets the robot come to rest.
 
         Raises:
             CommandError: for an unknown gait; lists the valid ones.
+            PolicyError: for a policy that cannot be used, or is another robot's.
+            MissingDependency: for a policy without the extra ``policies``.
         """
-        return self._call("walk", lambda: self._pilot.walk(gait))
+        self._check_open()
+        learned = None if policy is None else arguments.policy(policy, self._plant)
+        return self._call("walk", lambda: self._pilot.walk(gait, learned))
 
     def move(
         self,
@@ -430,7 +431,6 @@ class GO2Controller:
         return f"<GO2Controller {self._namespace}: {self.mode.value}, {plant}, {time:.2f} s>"
 
     def __reduce__(self) -> NoReturn:
-        """A robot is no value: it cannot be pickled or copied."""
         raise TypeError("a GO2Controller holds a running robot: make one in each process")
 
     # --- how calls are made ---------------------------------------------------------------
@@ -445,7 +445,7 @@ class GO2Controller:
         self._check_open()
         if self._pilot.mode is Mode.FALLEN and not allow_fallen:
             raise ModeError(f"{name}() needs a robot that has not fallen: call recover() first")
-        call = _Call(name, self._runner.loop.state.time)
+        call = Call(name, self._runner.loop.state.time)
         try:  # Ctrl-C may come anywhere: whose turn it is must be seen from what is stored
             running = self._turn.setdefault("call", call)  # looks and takes at once
             if running is not call:
@@ -467,7 +467,7 @@ class GO2Controller:
             if "call" in self._turn and self._turn["call"] is call:
                 del self._turn["call"]
 
-    def _run(self, call: _Call, procedure: Callable[[], Measurements]) -> bool:
+    def _run(self, call: Call, procedure: Callable[[], Measurements]) -> bool:
         _log.info("%s() at %.2f s", call.name, call.start)
         try:
             self._pilot.begin()
@@ -481,7 +481,7 @@ class GO2Controller:
         self._note(call, Outcome(True, "done", measured=dict(measured)))
         return True
 
-    def _note(self, call: _Call, outcome: Outcome, *, is_raised: bool = False) -> None:
+    def _note(self, call: Call, outcome: Outcome, *, is_raised: bool = False) -> None:
         """What came of ``call``, and which parts are broken that the reason does not name."""
         ok, reason = outcome.ok, outcome.reason
         if untold := [str(f) for f in self.health.faults if str(f) not in reason]:

@@ -19,7 +19,7 @@ from math import inf, isfinite
 
 import numpy as np
 
-from controller.behaviours import DAMPING, Behaviour, Damped
+from controller.behaviours import DAMPING, Behaviour, Damped, Shared
 from controller.pacing import REASON
 from controller.telemetry import Telemetry
 from go2_wbc.errors import ModeError, PlantError, PlantTimeout, QpInfeasible
@@ -237,7 +237,7 @@ class ControlLoop:
         """The command that has acted until now."""
         return self._commands[max(-1 - self.latency.acted, -len(self._commands))]
 
-    def _watch_feet(self, target: Reference | JointReference) -> None:
+    def _watch_feet(self, target: Reference | JointReference | Shared) -> None:
         if not (isinstance(target, Reference) and self.plant.motors_obey):
             return
         if hold_feet(Target.of(target.row), self.snapshot, self.state.tau, self._held) > PULLED:
@@ -268,20 +268,28 @@ class ControlLoop:
         told = reason if fault is None else f"{reason}, after: {fault.reason}"
         self.abandon(Fault(told, is_fall=True))
 
-    def _sag_and_lean(self, target: Reference | JointReference) -> tuple[float, float]:
+    def _sag_and_lean(self, target: Reference | JointReference | Shared) -> tuple[float, float]:
         """Depth [m] of the trunk below where it shall be, and its tilt [rad] from how it shall be.
 
         0 if nothing is asked of it.
         """
         if isinstance(target, JointReference):
             return 0.0, 0.0
-        planned = self.behaviour.sag_and_lean
-        return planned or sag_and_lean(Target.of(target.row), self.snapshot)
+        planned, shadow = self.behaviour.sag_and_lean, target
+        if isinstance(shadow, Shared):
+            shadow = shadow.reference
+        return planned or sag_and_lean(Target.of(shadow.row), self.snapshot)
 
-    def _command(self, target: Reference | JointReference) -> JointCommand:
+    def _command(self, target: Reference | JointReference | Shared) -> JointCommand:
         self._asked = self._solution = None
         if isinstance(target, JointReference):
             return JointCommand.servo(target.q_joints, target.v_joints, target.kp, target.kd)
+        if isinstance(target, Shared):
+            if target.share == 1.0:
+                return target.command
+            own = self._command(target.reference)
+            self._foretold = False
+            return target.mixed(own, self.state)
         try:
             wbc = self._dynamic_wbc if self.behaviour.is_dynamic else self.wbc
             self._asked = wbc, self.snapshot, target

@@ -38,6 +38,14 @@ Limited = Mapping[str, tuple[float, float | None]]
 """What was measured, by name with unit: the value, and what it must stay below, if anything."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Call:
+    """A call that runs: its name, and when [s] it began."""
+
+    name: str
+    start: float
+
+
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """What came of a blocking call, or of a job.

@@ -17,6 +17,7 @@ from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.standing import Standing
 from controller.modes import Aborted, Measurements, Mode
 from controller.navigation import Goal
+from controller.policies.policy import Policy
 from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
 from controller.telemetry import SeenTerrain
@@ -179,14 +180,18 @@ class Pilot:
 
     # --- walking --------------------------------------------------------------------------
 
-    def walk(self, gait: str | Gait) -> Measurements:
-        """Enter walking mode, ready for commands; one that walks goes on, with this gait."""
+    def walk(self, gait: str | Gait, policy: Policy | None = None) -> Measurements:
+        """Enter walking mode, ready for commands; one that walks goes on, with this gait.
+
+        With a ``policy`` that walks when there is a command, and the gait without one.
+        """
         self._walker.require(gait)
         if self.mode is not Mode.WALKING:
             self._ensure_standing()
             self._walker.start(gait)
         else:
             self._walker.take(gait)
+        self._walker.hand_over(policy)
         self.wait(READY_TIME)
         self._mode = Mode.WALKING
         return self._runner.measurements()
@@ -244,11 +249,12 @@ class Pilot:
                 if self._goal is None:
                     return True
                 self._walker.follow(goal.command(loop.state))
-                return goal.is_done(loop.state) or bool(self._walker.walking.blocked)
+                walking = self._walker.walking
+                return goal.is_done(loop.state) or bool(walking.blocked or walking.refusal)
 
             goal.begin(loop.state)
             self._runner.until(is_over, goal.time_limit, goal.name)
-            blocked = self._walker.walking.blocked
+            blocked = self._walker.walking.blocked or self._walker.refusal
             self.rest()
             was_halted = self._goal is None
         finally:
@@ -357,6 +363,8 @@ class Pilot:
         fault = self._loop.fault
         if fault is not None and fault is not known_fault:
             raise Aborted(fault.reason, self._runner.measurements())
+        if refusal := self._walker.refusal:
+            raise Aborted(refusal, self._runner.measurements())
         return self._runner.measurements()
 
     @property

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from controller.behaviours.learned import HAND_OVER, Learned
 from controller.behaviours.walking import Walking
 from controller.modes import Limited, calm
+from controller.policies.policy import Policy
+from controller.policies.sidecar import CommandRanges
 from controller.runner import REST_TIME, Runner
 from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS, Gait, find_gait
@@ -26,15 +29,22 @@ class Walker:
         self._runner, self._config = runner, config
         self.walking = Walking(runner.loop.model, find_gait("trot"), config.locomotion)
         """The behaviour that walks, or will."""
-        self._envelope = self._envelope_of(self.walking)
+        self._envelope: VelocityEnvelope | CommandRanges = self._envelope_of(self.walking)
 
     def excess(self, command: VelocityCommand) -> tuple[int, str]:
         """How far ``command`` is beyond the gait's envelope (0 if not, 2 by far), and in words."""
         if not (excess := self._envelope.excess(command)):
             return 0, ""
         name = self.walking.gait.name if self.walking.choice is None else AUTO
-        told = f"{excess}; the envelope of gait {name!r} is {self._envelope}"
+        whose = f"gait {name!r}" if self._policy is None else f"policy {self._policy.name}"
+        told = f"{excess}; the envelope of {whose} is {self._envelope}"
         return 1 + self._envelope.is_far(command), told
+
+    @property
+    def _policy(self) -> Policy | None:
+        """What walks when there is a command, if it is learned."""
+        learned = self.walking.learned
+        return learned.policy if learned is not None and learned.is_wanted else None
 
     @property
     def command(self) -> VelocityCommand:
@@ -57,6 +67,27 @@ class Walker:
         self._runner.engage(walking)
         self.walking = walking
         self._envelope = self._envelope_of(walking)
+
+    def hand_over(self, policy: Policy | None) -> None:
+        """Let ``policy`` walk when there is a command; the whole-body controller if None."""
+        walking = self.walking
+        if (learned := walking.learned) is not None:
+            learned.is_wanted = False
+            self._runner.until(lambda: walking.learned is None, 10.0 * HAND_OVER, "hand over")
+        walking.refusal = ""
+        if policy is None:
+            self._envelope = self._envelope_of(walking)
+        else:
+            self._envelope = policy.sidecar.commands
+        walking.command = self._envelope.clip(walking.command)
+        if policy is not None:
+            walking.learned = Learned(policy, self._runner.loop.model)
+
+    @property
+    def refusal(self) -> str:
+        """Why a policy had to be refused since this was asked last; "" if none had."""
+        refusal, self.walking.refusal = self.walking.refusal, ""
+        return refusal
 
     def take(self, gait: str | Gait) -> None:
         """Walk on with ``gait``, slowing down into its envelope before."""
@@ -108,10 +139,13 @@ class Walker:
             pose: wanted of the trunk; None keeps the one that is followed.
 
         Raises:
-            CommandError: if the pose is beyond its envelope; nothing is followed then.
+            CommandError: if the pose is beyond its envelope, or a policy walks, which takes none;
+                nothing is followed then.
         """
         if pose is not None:
             self._config.pose.require(pose)
+            if pose != LEVEL and self._policy is not None:
+                raise CommandError(f"policy {self._policy.name} takes no pose of the trunk")
             self.walking.pose = pose
         self.walking.command = self._envelope.clip(command)
         return self.walking.command

@@ -10,6 +10,7 @@
     ├── ClosedError             a call after close()
     ├── BridgeError             other middleware cannot be reached or used
     ├── StudioError             a motion's file cannot be edited as asked; it stays as it was
+    ├── PolicyError             a learned policy, or its sidecar, cannot be used; says why
     ├── SweepError              a run over seeds cannot begin or go on; says what is kept
     ├── QpError
     │   ├── QpInfeasible        no solution satisfies the constraints; carries residuals
@@ -73,6 +74,10 @@ class BridgeError(Go2WbcError):
 
 class StudioError(Go2WbcError):
     """A motion's file cannot be edited as asked; it stays as it was."""
+
+
+class PolicyError(Go2WbcError, ValueError):
+    """A learned policy or its sidecar cannot be used, or has given what is not finite."""
 
 
 class SweepError(Go2WbcError):
@@ -196,6 +201,7 @@ EXTRAS: Mapping[str, str] = {
     "music": "the beats of a song: dance",
     "sweep": "sweeps as Parquet files",
     "cluster": "sweeps on many machines",
+    "policies": "learned policies: walk(policy=...), in ONNX files",
     "gamepad": "a gamepad for teleop",
     "learning": "Gymnasium's environments, data sets",
     "mcap": "recordings as MCAP files, for Foxglove",

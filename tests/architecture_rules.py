@@ -23,7 +23,7 @@ DISTRIBUTIONS = {"pinocchio": "pin", "PIL": "pillow", "collada": "pycollada"}
 
 OPTIONAL = frozenset(
     {"rclpy", "cyclonedds", "crocoddyl", "librosa", "soundfile", "ray", "pyarrow", "pandas"}
-    | {"gymnasium", "mcap", "rerun"}
+    | {"gymnasium", "mcap", "onnx", "onnxruntime", "rerun"}
 )
 """Libraries that are imported only by those who have them; contracts keep them apart."""
 

@@ -70,6 +70,10 @@ def _verdict() -> object:
     return verdict_of(thing("checker").check(thing("steep")))
 
 
+def _trot() -> Path:
+    return importlib.import_module("controller.policies").TROT
+
+
 def _page() -> object:
     return place() / "a.html"
 
@@ -125,6 +129,8 @@ MADE_INSIDE = {
         "CertifiedRate",
         "against",
         "steady",
+        "CommandRanges",
+        "Term",
     ),
 }
 """Results, which nobody but the project makes; and what is made in every tick."""
@@ -147,6 +153,7 @@ EXEMPT |= {
     ),
     *("motions.CompiledPlan.row_at", "motions.CompiledPlan.feedback_at"),
     *("go2_wbc.ContactSchedule.at", "go2_wbc.LocomotionPlanner.why_not_resting"),
+    *("go2_wbc.LocomotionPlanner.follow_feet", "controller.Sidecar"),
 }
 """What is made or asked in every tick is not checked there: what takes it refuses what is wrong."""
 EXEMPT_HUGE = {"go2_wbc.VelocityCommand", "go2_wbc.BodyPose"}
@@ -205,7 +212,8 @@ GOOD |= {
     "go2_wbc.JointCommand.asked(q)": lambda: np.zeros(12),
     "go2_wbc.JointCommand.asked(v)": lambda: np.zeros(12),
     "go2_wbc.LocomotionPlanner.update(command)": lambda: thing("go2").command,
-    **{"seed": _value(3), "value": _value(0.5)},
+    **{"seed": _value(3), "value": _value(0.5), "network": _value(lambda x: x[:12])},
+    "sidecar": lambda: importlib.import_module("controller.policies").Policy.load(_trot()).sidecar,
     **dict.fromkeys(("go2_wbc.Gains(kp)", "go2_wbc.Gains(kd)"), _value((1.0, 1.0, 1.0))),
     "go2_wbc.JointFriction.by_part(dry)": _value((0.1, 0.1, 0.2)),
     "go2_wbc.ContactSchedule(times)": _value((0.0, 0.5)),

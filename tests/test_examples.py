@@ -24,6 +24,7 @@ NEEDS = {
     "29_ros2_student_class": "rclpy",
     "30_sport_client": "cyclonedds",
     "33_learn_with_gymnasium": "gymnasium",
+    "34_clone_the_trot": "onnxruntime",
 }
 """What an example needs beside the project."""
 BEHIND = re.compile(r"^(WARNING: )?the loop is \d+ ms behind the wall clock$")
@@ -63,6 +64,11 @@ POINTS = {
     "29_ros2_student_class": ("up: True", "walk: True", "high_five: True", "sit: True"),
     "30_sport_client": ("version: 1", "'STAND_UP': 0, 'BALANCE_STAND': 0"),
     "31_walk_with_my_own_task": (r"0 tasks .* 0\.1\d\d rad/s", r"1 tasks .* rad/s, [345]\d%"),
+    "34_clone_the_trot": (
+        "round 3: the teacher .* 30%",
+        r"the network walks at 0\.[45]\d m/s",
+        "walks on: walking",
+    ),
     "33_learn_with_gymnasium": (
         r"26:38 +joint_velocities \[rad/s\]",
         r"random: 0\.\d s, .* by fall",

@@ -6,13 +6,46 @@ Here those that need no contact model: going limp, and moving the joints by a se
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from go2_wbc.curves import Curve
 from go2_wbc.reference import JointReference, Reference
-from go2_wbc.robot.state import Snapshot
+from go2_wbc.robot.state import JointCommand, RobotState, Snapshot
+
+
+@dataclass(frozen=True, slots=True)
+class Shared:
+    """What to track while somebody else moves the joints, too.
+
+    Attributes:
+        reference: for the whole-body controller.
+        command: of the other one.
+        share: of that in the torques, above 0, at most 1.
+    """
+
+    reference: Reference
+    command: JointCommand
+    share: float
+
+    @property
+    def stance(self) -> Bool[np.ndarray, "4"]:
+        """Feet that are planned to carry the robot."""
+        return self.reference.stance
+
+    def mixed(self, own: JointCommand, state: RobotState) -> JointCommand:
+        """The other's command, and that of the whole-body controller as a torque."""
+        rest, theirs = 1.0 - self.share, self.command
+        tau = rest * own.asked(state.joint_positions, state.joint_velocities)
+        return JointCommand(
+            tau + self.share * theirs.tau,
+            theirs.q_des,
+            theirs.v_des,
+            self.share * theirs.kp,
+            self.share * theirs.kd,
+        )
 
 
 class Behaviour(ABC):
@@ -44,7 +77,7 @@ class Behaviour(ABC):
         self._start = snapshot.state.time
 
     @abstractmethod
-    def update(self, snapshot: Snapshot) -> Reference | JointReference:
+    def update(self, snapshot: Snapshot) -> Reference | JointReference | Shared:
         """What to track now."""
 
     def is_finished(self, snapshot: Snapshot) -> bool:

@@ -184,7 +184,7 @@ class Standing(ChangePosture):
 def _walk_on(steps: Walking, snapshot: Snapshot) -> Reference:
     """The reference of the steps, after whose first tick they may become slower."""
     steps.command = going_on(snapshot)
-    reference = steps.update(snapshot)
+    reference = steps.planned(snapshot)
     if steps.gait.starts_at_once:
         steps.change_gait(replace(STEPS, offsets=steps.gait.offsets))
     return reference

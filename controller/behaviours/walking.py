@@ -6,7 +6,8 @@ import logging
 
 import numpy as np
 
-from controller.behaviours import Behaviour
+from controller.behaviours import Behaviour, Shared
+from controller.behaviours.learned import Learned
 from go2_wbc.contacts import Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.envelopes import DWELL, GaitChoice
@@ -27,7 +28,8 @@ STEADYING = 0.15
 class Walking(Behaviour):
     """Walk with ``gait`` and follow ``command`` and ``pose``; stand ready without command.
 
-    With a ``choice`` the gait is chosen by the speed.
+    With a ``choice`` the gait is chosen by the speed. What is ``learned``, if anything, walks in
+    its stead while there is a command, until it has to be refused.
     """
 
     label = "walk"
@@ -48,6 +50,8 @@ class Walking(Behaviour):
         self.command: VelocityCommand = ZERO_COMMAND
         self.pose: BodyPose = LEVEL
         self.choice: GaitChoice | None = None
+        self.learned: Learned | None = None
+        self.refusal = ""
         self._limit, self._is_limited_until = VelocityEnvelope(), -np.inf
         self._planner = LocomotionPlanner(model, gait, config, heights)
         self._most, self._heights = config.rough.speed, heights
@@ -57,7 +61,21 @@ class Walking(Behaviour):
         """Start from the measured state, standing."""
         self._planner.start(snapshot, self._known_friction, self._had_slid)
 
-    def update(self, snapshot: Snapshot) -> Reference:
+    def update(self, snapshot: Snapshot) -> Reference | Shared:
+        """The planner's reference, and what a policy makes of the command."""
+        reference, learned = self.planned(snapshot), self.learned
+        if learned is None:
+            return reference
+        command = self.asked(snapshot.state.time)
+        target = learned.update(snapshot, reference, command, self._planner)
+        self.label = "policy" if learned.share else Walking.label
+        if learned.refusal:
+            self.refusal, self.command = learned.refusal, ZERO_COMMAND
+        if learned.is_over:
+            self.learned = None
+        return target
+
+    def planned(self, snapshot: Snapshot) -> Reference:
         """The planner's reference."""
         now = snapshot.state.time
         command = self.asked(now)
@@ -67,7 +85,8 @@ class Walking(Behaviour):
             if gait != self.gait:
                 self.change_gait(gait)
         reference = self._planner.update(snapshot, command, self.pose, self.delay)
-        if not self._has_told and self._planner.is_slowed:
+        is_own = self.learned is None or not self.learned.share
+        if is_own and not self._has_told and self._planner.is_slowed:
             self._has_told = True
             if self._planner.is_late:
                 _log.warning("commands act %.0f ms late: it walks slower", 1000.0 * self.delay)

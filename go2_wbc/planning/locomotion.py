@@ -379,6 +379,25 @@ class LocomotionPlanner:
         return self._state.is_stepping
 
     @property
+    def phase(self) -> float:
+        """Share of the front left foot's stride that has passed since it touched down."""
+        clock = self._state.clock
+        return float((clock.time / clock.period - clock.offsets[0]) % 1.0)
+
+    def follow_feet(self, landed: Bool[np.ndarray, "4"], share: float) -> None:
+        """Somebody else moves the feet: keep in step, and learn nothing of rough ground by them.
+
+        Args:
+            landed: which have just come down.
+            share: of the way to where the stride would be by them, that its clock goes.
+        """
+        clock, ground = self._state.clock, self._state.ground
+        for leg in np.flatnonzero(landed).tolist():
+            ahead = (clock.time / clock.period - clock.offsets[leg] + 0.5) % 1.0 - 0.5
+            clock.time = float(clock.time - share * ahead * clock.period) % clock.period
+        ground.rough_way = ground.high_way = ground.ramp_way = 0.0
+
+    @property
     def heading(self) -> float:
         """Yaw [rad] of the reference; 0 before ``start``."""
         return float(self._state.trunk.yaw)

@@ -64,6 +64,32 @@ class IdealRobot:
         )
 
 
+# --- in the shadow of somebody else -----------------------------------------------------------
+
+
+@pytest.mark.parametrize("leg", range(4))
+@pytest.mark.parametrize("share", [0.3, 1.0])
+def test_the_stride_follows_a_foot_that_comes_down(leg: int, share: float) -> None:
+    planner, landed = started(resting()), np.arange(4) == leg
+    hold(planner, resting(), VelocityCommand(0.3), 0.1)
+    down = (TROT.offsets[leg] - TROT.offsets[0]) % 1.0  # of the front left foot's stride
+    ahead = (planner.phase - down + 0.5) % 1.0 - 0.5
+    assert abs(ahead) > 0.1
+    planner.follow_feet(landed, share)
+    left = (planner.phase - down + 0.5) % 1.0 - 0.5
+    assert left == pytest.approx((1.0 - share) * ahead)
+
+
+def test_the_phase_is_that_of_the_front_left_foot() -> None:
+    planner = started(resting())
+    reference = hold(planner, resting(), VelocityCommand(0.3), 0.0)
+    assert planner.phase == pytest.approx(0.5, abs=TICK / TROT.period)
+    assert not reference.stance[0]
+    assert reference.stance[1]
+    hold(planner, resting(), VelocityCommand(0.3), 0.5 * TROT.period)
+    assert min(planner.phase, 1.0 - planner.phase) < 2.0 * TICK / TROT.period
+
+
 # --- standing and starting ------------------------------------------------------------------------
 
 
