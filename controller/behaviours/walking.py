@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 
 import numpy as np
 
@@ -54,7 +55,7 @@ class Walking(Behaviour):
         self.refusal = ""
         self._limit, self._is_limited_until = VelocityEnvelope(), -np.inf
         self._planner = LocomotionPlanner(model, gait, config, heights)
-        self._most, self._heights = config.rough.speed, heights
+        self._most = config.rough.speed
         self._has_told, self._told_block = False, ""
 
     def start(self, snapshot: Snapshot) -> None:
@@ -92,11 +93,10 @@ class Walking(Behaviour):
                 _log.warning("commands act %.0f ms late: it walks slower", 1000.0 * self.delay)
             else:
                 _log.warning("rough ground: %g m/s at most until it is smooth again", self._most)
-        if self._heights is not None and self._heights.is_used:
-            blocked = self.blocked
-            if blocked and not self._told_block:
-                _log.warning("stopped: %s", blocked)
-            self._told_block = blocked
+        blocked = self.blocked
+        if blocked and not self._told_block:
+            _log.warning("stopped: %s", blocked)
+        self._told_block = blocked
         return reference
 
     def square_up(self, snapshot: Snapshot) -> bool:
@@ -151,8 +151,9 @@ class Walking(Behaviour):
     @property
     def blocked(self) -> str:
         """What stops the robot that is commanded to go on, in plain words; "" if nothing does."""
-        sight, asked = self._planner.sight, np.hypot(self.command.linear_x, self.command.linear_y)
-        return sight.why_blocked if sight.is_slowed and asked > STEADYING else ""
+        sight, command = self._planner.sight, self.command
+        is_asked = sight.is_slowed and math.hypot(command.linear_x, command.linear_y) > STEADYING
+        return sight.why_blocked if is_asked else ""
 
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether the robot has come to rest."""

@@ -55,7 +55,7 @@ from go2_wbc.planning.rest import (
     start_stepping,
     why_not_resting,
 )
-from go2_wbc.planning.sight import Sight, look, steps_by_sight
+from go2_wbc.planning.sight import look, steps_by_sight
 from go2_wbc.planning.sighted_steps import height_to_land, swing_by_sight
 from go2_wbc.planning.swing import (
     FootContact,
@@ -176,11 +176,12 @@ def note_liftoffs(
             met[leg] = True
             foot.is_awaited = False
         foot.was_stance = stance[leg]
-    height, a, b = s.ground.height, s.ground.slope[0], s.ground.slope[1]
-    learn_ground(s.ground, now, c.foot_radius, met, s.delay)
     if s.sight.sees:
-        s.ground.height, s.ground.slope[0], s.ground.slope[1] = height, a, b
+        for leg in range(4):
+            if met[leg]:
+                s.ground.p_met[leg] = now.p_world_feet[leg]
         return
+    learn_ground(s.ground, now, c.foot_radius, met, s.delay)
     if stumbles.any():
         note_stumble(s.ground)
     for leg in range(4):
@@ -280,7 +281,11 @@ def plan(
 
 
 class LocomotionPlanner:
-    """Turns a velocity command into references, one tick after the other."""
+    """Turns a velocity command into references, one tick after the other.
+
+    Attributes:
+        sight: what has been seen of the way.
+    """
 
     @typed()
     def __init__(
@@ -297,6 +302,7 @@ class LocomotionPlanner:
         self._model, self._config = model, config
         self._heights = HeightMap() if heights is None else heights
         self._state, self._command = Planner(), Command()
+        self.sight = self._state.sight
         self.change_gait(gait)
 
     def __repr__(self) -> str:
@@ -338,6 +344,7 @@ class LocomotionPlanner:
             feet=feet,
             planned=PlannedForces(next=-np.inf),
         )
+        self.sight = self._state.sight
         restart(self._state.clock, self._walk.cadence)
 
     @typed()
@@ -367,11 +374,6 @@ class LocomotionPlanner:
     def is_late(self) -> bool:
         """Whether commands act so late that the robot walks slower."""
         return bool(self._state.delay >= LATE)
-
-    @property
-    def sight(self) -> Sight:
-        """What has been seen of the way."""
-        return self._state.sight
 
     @property
     def is_stepping(self) -> bool:

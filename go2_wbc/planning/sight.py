@@ -2,9 +2,10 @@
 
 The plane z = h + s (p - p_com) fits, by least squares, the known ground from ``BEHIND`` to
 ``AHEAD`` of the CoM and ``ASIDE``, and with ``LANDING_WEIGHT`` where each foot was met last. Pits
-and walls, which no foot stands on, are left out. What the trunk follows comes near to it with the
-time constant ``SMOOTH_TIME``. Going up, the trunk is pitched as the plane is; going down it is
-carried higher, where the calves pass over the edges behind their feet.
+and walls, which no foot stands on, are left out. It is fitted anew, and the way looked along, every
+``AGAIN`` seconds. What the trunk follows comes near to it with the time constant ``SMOOTH_TIME``.
+Going up, the trunk is pitched as the plane is; going down it is carried higher, where the calves
+pass over the edges behind their feet.
 
 Where the ground has steps of more than ``UNEVEN`` the feet are placed and swung by the map
 (``sighted_steps``), at ``SPEED`` and with ``gait_clock.SEEN_STRIDE``.
@@ -21,6 +22,7 @@ from __future__ import annotations
 import numpy as np
 
 from go2_wbc.compilation import subroutine
+from go2_wbc.contacts import TIE
 from go2_wbc.planning.ground import FOLLOW, Ground
 from go2_wbc.planning.height_map import CELL, HeightMap, height_at
 from go2_wbc.records import V3, Array3, Record
@@ -34,8 +36,8 @@ LEAST_KNOWN = 0.5
 """Share of the samples that must be known."""
 STEEPEST = 0.75
 """Greatest slope that is believed: that of stairs of 23 cm."""
-SMOOTH_TIME = 0.12
-"""Time constant [s] with which the trunk follows the plane."""
+AGAIN, SMOOTH_TIME = 0.02, 0.12
+"""Time [s] between two looks, and time constant [s] with which the trunk follows the plane."""
 PIT = 0.24
 """Height [m] below, or above, all feet from which on ground is none to stand on."""
 UNEVEN, UNEVEN_WAY = 0.04, 0.4
@@ -72,7 +74,10 @@ class Sight(Record):
     """What a walk has seen.
 
     Attributes:
+        since: for how long [s] it has not looked.
         sees: whether the ground below the trunk is known.
+        plane: height [m] below the CoM and slope of the ground.
+        most: greatest speed [m/s] that the way permits.
         uneven_way: for how far [m] the ground is taken for uneven yet.
         lift: height [m] by which the trunk is carried higher.
         blocked: what ends the way ahead, 0 for nothing.
@@ -81,7 +86,10 @@ class Sight(Record):
         is_slowed: whether the robot is told less than it was asked for.
     """
 
+    since: float
     sees: bool
+    plane: Array3
+    most: float
     uneven_way: float
     lift: float
     blocked: float
@@ -225,22 +233,16 @@ def way_ahead(m: HeightMap, x: float, y: float, way: V3, here: float) -> tuple[f
 
 
 @subroutine
-def look(
-    sight: Sight,
-    g: Ground,
-    m: HeightMap,
-    now: Snapshot,
-    yaw: float,
-    velocity: Array3,
-    dt: float,
+def look_anew(
+    sight: Sight, g: Ground, m: HeightMap, now: Snapshot, yaw: float, velocity: Array3, dt: float
 ) -> None:
-    """Bring the plane, and what is known of the way, to this tick, ``dt`` seconds after the last.
+    """Take in the ground below and ahead, ``dt`` seconds after the last time.
 
-    ``velocity``: that is commanded, in the heading frame; what ends the way limits it.
+    ``velocity``: that is commanded, in the heading frame.
     """
-    x, y, plane = now.p_world_com[0], now.p_world_com[1], np.empty(3)
+    x, y, plane = now.p_world_com[0], now.p_world_com[1], sight.plane
     sight.sees = fitted_plane(g, m, x, y, yaw, now.foot_radius, plane)
-    sight.blocked, sight.is_slowed, g.steeper = 0.0, False, 0.0
+    sight.blocked, g.steeper = 0.0, 0.0
     if not sight.sees:
         sight.uneven_way = 0.0
         return
@@ -250,10 +252,6 @@ def look(
     mean, highest, steps = unevenness(m, x, y, way, plane)
     come = np.hypot(now.v_world_com[0], now.v_world_com[1]) * dt
     sight.uneven_way = UNEVEN_WAY if steps > 0 else max(sight.uneven_way - come, 0.0)
-    share = min(dt / SMOOTH_TIME, 1.0)
-    g.height += share * (plane[0] - g.height)
-    g.slope[0] += share * (plane[1] - g.slope[0])
-    g.slope[1] += share * (plane[2] - g.slope[1])
     g.roughness, g.rough_way, g.high_way, g.rise_way = mean, 0.0, 0.0, 0.0
     climb = g.slope[0] * way[0] + g.slope[1] * way[1]
     g.steeper = 1.0 - FOLLOW if climb > 0.0 else 0.0
@@ -262,10 +260,39 @@ def look(
     sight.blocked, sight.end = way_ahead(m, x, y, way, plane[0])
     is_near = sight.blocked != 0.0 and sight.end < STOP + NEAR_STOP
     sight.stopped = sight.stopped + dt if is_near else 0.0
-    most = SPEED if sight.uneven_way > 0.0 else np.inf
+    sight.most = SPEED if sight.uneven_way > 0.0 else np.inf
     if steps >= FLIGHT and highest > FLIGHT_STEP:
-        most = FLIGHT_SPEED
+        sight.most = FLIGHT_SPEED
     if sight.blocked != 0.0:
-        most = min(most, np.sqrt(2.0 * BRAKING * max(sight.end - STOP, 0.0)))
-    sight.is_slowed = most < speed
-    velocity *= min(most / max(speed, _TINY), 1.0)
+        sight.most = min(sight.most, np.sqrt(2.0 * BRAKING * max(sight.end - STOP, 0.0)))
+
+
+@subroutine
+def look(
+    sight: Sight,
+    g: Ground,
+    m: HeightMap,
+    now: Snapshot,
+    yaw: float,
+    velocity: Array3,
+    dt: float,
+) -> None:
+    """Bring the ground, and what is known of the way, to this tick, ``dt`` seconds after the last.
+
+    ``velocity``: that is commanded, in the heading frame; what ends the way limits it.
+    """
+    plane = sight.plane
+    sight.since += dt
+    plane[0] += dt * (plane[1] * now.v_world_com[0] + plane[2] * now.v_world_com[1])
+    if sight.since > AGAIN - TIE or not sight.sees:
+        look_anew(sight, g, m, now, yaw, velocity, sight.since)
+        sight.since = 0.0
+    sight.is_slowed = False
+    if sight.sees:
+        share = min(dt / SMOOTH_TIME, 1.0)
+        g.height += share * (plane[0] - g.height)
+        g.slope[0] += share * (plane[1] - g.slope[0])
+        g.slope[1] += share * (plane[2] - g.slope[1])
+        speed = np.hypot(velocity[0], velocity[1])
+        sight.is_slowed = sight.most < speed
+        velocity *= min(sight.most / max(speed, _TINY), 1.0)

@@ -10,6 +10,7 @@ from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.height_map import HeightMap
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.planning.sight import (
+    AGAIN,
     DROP,
     FLIGHT_SPEED,
     LIFT,
@@ -97,6 +98,24 @@ def test_the_trunk_follows_a_slope_before_a_foot_has_met_it(angle: float) -> Non
     np.testing.assert_allclose(
         slope, [math.tan(angle), 0.0], atol=0.1 * abs(math.tan(angle)) + 0.01
     )
+
+
+def test_between_two_looks_the_plane_is_carried_along_with_the_robot() -> None:
+    """A height that is 20 ms old would be 8 mm off."""
+    walking, looks, before = planner(exact_map(Slope(0.38))), 0, 0.0
+    q, v = standing_q(), np.zeros(18)
+    v[0], v[2] = 1.0, math.tan(0.38)
+    for n in range(200):
+        q[:3] = standing_q()[:3] + 0.002 * n * v[:3]
+        walking.update(MODEL.snapshot(state_of(q, v, 0.002 * n)), VelocityCommand(0.5))
+        height, slope = walking.sight.plane[:2]
+        if walking.sight.since == 0.0:
+            looks += 1
+        else:
+            assert height - before == pytest.approx(0.002 * slope)
+        assert slope == pytest.approx(math.tan(0.38), abs=0.03)
+        before = height
+    assert looks == pytest.approx(200 * 0.002 / AGAIN, abs=2)
 
 
 @pytest.mark.parametrize(
