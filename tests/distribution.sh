@@ -49,6 +49,12 @@ test -s out/demo/demo.html
 "$bin/high_five_demo" --no-media >/dev/null
 "$bin/go2-wbc" check wave >/dev/null
 
+echo "== learners: without the extra its name, with it an environment"
+! "$bin/python" -c "from controller.learning import Go2Env" 2>"$work/missing"
+grep -q 'go2-wbc\[learning\]' "$work/missing"
+"$bin/pip" install --quiet "$(echo "$work"/dist/*.whl)[learning]"
+"$bin/python" -c "import gymnasium; gymnasium.make('controller.learning:Go2-v0').reset(seed=0)"
+
 echo "== tutorial, README and guides, as written"
 (cd "$here" && GO2_WBC_USERS_BIN="$bin" "$python" -m pytest -n 2 -q tests/test_docs.py \
     -k "tutorial or runs_alone")

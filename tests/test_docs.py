@@ -28,6 +28,7 @@ from tests.motions.doctored import DoctoredPlan
 from tests.pages import (
     DOCS,
     NOT_RUN,
+    USERS_BIN,
     Block,
     blocks,
     difference,
@@ -106,6 +107,8 @@ def test_a_python_block_that_is_not_run_compiles(name: str) -> None:
 @pytest.mark.parametrize("block", RUNNING.values(), ids=RUNNING)
 def test_a_python_block_runs_alone_and_says_nothing_bad(block: Block, tmp_path: Path) -> None:
     done = run_python(block.text, tmp_path)
+    if USERS_BIN and "No module named 'gymnasium'" in done.stderr:
+        pytest.skip("gymnasium is not installed")
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     assert "False" not in done.stdout

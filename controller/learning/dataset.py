@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from controller.learning.expert import EPISODE, Columns, Expert
+from controller.learning.expert import EPISODE, Arrays, Expert
 from controller.learning.tasks import TASKS, Commands, Range
 from controller.observation import OBSERVATION, RATE, STANCE
 from controller.sweeps.motion_study import archive_of, plan_of
@@ -59,7 +59,7 @@ class Dataset:
         about: task, units and order of the columns, rate [1/s], gains, versions.
     """
 
-    columns: Columns
+    columns: Arrays
     about: Mapping[str, Any]
 
     __repr__ = brief
@@ -240,7 +240,7 @@ def _require_same(recorder: Recorder) -> None:
             raise ConfigError(f"{file} holds something else, {told}: choose another folder")
 
 
-def _parquet(columns: Columns, about: str) -> bytes:
+def _parquet(columns: Arrays, about: str) -> bytes:
     pyarrow, parquet = _pyarrow()
     arrays = {}
     for name, values in columns.items():

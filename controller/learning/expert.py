@@ -32,7 +32,7 @@ EPISODE = 20.0  #: Time [s] of a walk
 LONGEST_STRIDE = 1.0  #: Time [s] between two touchdowns from which on the robot has rested
 _TICKS = 500.0  # a second: the rate at which the recording has every tick
 
-Columns = Mapping[str, np.ndarray]
+Arrays = Mapping[str, np.ndarray]
 """What the rows hold, by name; the first axis is that of the rows."""
 
 
@@ -55,7 +55,7 @@ class Expert:
     kp: float = KP
     kd: float = KD
 
-    def episode(self, seed: int) -> Columns:
+    def episode(self, seed: int) -> Arrays:
         """The rows of an episode that is drawn from ``seed``; they end where the robot falls.
 
         Raises:

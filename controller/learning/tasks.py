@@ -115,6 +115,12 @@ class LearningTask:
 
     __repr__ = brief
 
+    def __post_init__(self) -> None:
+        """Raise CommandError for a weight of no term."""
+        for name in self.weights:
+            if name not in WEIGHTS:
+                raise CommandError(unknown_name("term of the reward", name, WEIGHTS))
+
     def draw_world(self, rng: np.random.Generator) -> World:
         """The world of an episode."""
         return replace(self.world.sample(rng), delay=float(rng.uniform(*self.delay)))

@@ -14,7 +14,7 @@ pytest.importorskip("gymnasium", reason='needs pip install "go2-wbc[learning]"')
 import gymnasium
 from gymnasium.utils.env_checker import check_env
 
-from controller.learning import ENVIRONMENTS, TASKS, Go2Env
+from controller.learning import ENVIRONMENTS, TASKS, Go2Env, LearningTask
 from controller.learning.tasks import WEIGHTS
 from controller.observation import OBSERVATION, RATE, STANCE, TARGETS, TORQUES
 from go2_wbc.errors import CommandError
@@ -59,6 +59,27 @@ def test_they_are_registered_by_an_import_and_by_the_name_of_the_module() -> Non
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.stdout.strip() == f"({OBSERVATION.size},)", done.stderr
+
+
+def test_without_the_extra_the_room_opens_and_what_is_missing_is_named() -> None:
+    program = """
+import sys
+sys.modules.update(gymnasium=None, pyarrow=None)
+import controller.learning as learning
+print(learning.OBSERVATION.size)
+for use in (lambda: learning.Go2Env(), lambda: learning.record("walk.parquet")):
+    try:
+        use()
+    except Exception as error:
+        print(type(error).__name__, error)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    size, *told = done.stdout.splitlines()
+    assert int(size) == OBSERVATION.size, done.stderr
+    assert len(told) == 2
+    for line in told:
+        assert line.startswith("MissingDependency")
+        assert "go2-wbc[learning]" in line
 
 
 @pytest.mark.parametrize("name", TASKS)
@@ -221,7 +242,9 @@ def test_wrong_settings_are_named(settings: dict[str, Any], told: str) -> None:
         Go2Env(**settings)
 
 
-def test_wrong_options_and_actions_are_named() -> None:
+def test_wrong_options_actions_and_weights_are_named() -> None:
+    with pytest.raises(CommandError, match="bounce"):
+        LearningTask("own", weights={"bouncing": 1.0})
     environment = Go2Env()
     for options in ({"speed": 1.0}, {"command": (1.0,)}, {"command": (math.nan, 0.0, 0.0)}):
         with pytest.raises(CommandError, match="command"):
