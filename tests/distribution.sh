@@ -54,6 +54,9 @@ echo "== learners: without the extra its name, with it an environment"
 grep -q 'go2-wbc\[learning\]' "$work/missing"
 "$bin/pip" install --quiet "$(echo "$work"/dist/*.whl)[learning]"
 "$bin/python" -c "import gymnasium; gymnasium.make('controller.learning:Go2-v0').reset(seed=0)"
+! "$bin/python" -c "from controller.policies import TROT, Policy; Policy.load(TROT)" 2>"$work/missing"
+grep -q 'go2-wbc\[policies\]' "$work/missing"
+"$bin/pip" install --quiet "$(echo "$work"/dist/*.whl)[policies]"
 
 echo "== tutorial, README and guides, as written"
 (cd "$here" && GO2_WBC_USERS_BIN="$bin" "$python" -m pytest -n 2 -q tests/test_docs.py \

@@ -26,6 +26,6 @@ shown_runs "$work/clone/.venv/bin" "tutorial or runs_alone or prints_its_point"
 echo "== the wheel, with the extras that examples and notebooks name"
 "$python" -m build --wheel --outdir "$work/dist" . >"$work/build.log" 2>&1 || { cat "$work/build.log"; exit 1; }
 "$python" -m venv "$work/environment"
-"$work/environment/bin/pip" install --quiet "$(echo "$work"/dist/*.whl)[examples,notebooks,dynamics,learning,music,unitree]"
+"$work/environment/bin/pip" install --quiet "$(echo "$work"/dist/*.whl)[examples,notebooks,dynamics,learning,music,policies,unitree]"
 shown_runs "$work/environment/bin" "tutorial or runs_alone or prints_its_point or clean_kernel"
 echo "== all of it works in both"

@@ -12,8 +12,8 @@ times a factor. Each run begins in the same state, and is marked by
 over its last two thirds, and by 10 and more if it falls. What is changed where the mark is by far
 the best is what is wrong.
 
-It does not see what the policy hardly needs (of the clone's, half the joint velocities), what is
-wrong in two places at once, default poses, clips, history, and clocks off by half a stride.
+It does not see what the policy hardly needs (half the joint velocities do for the clone), what is
+wrong in two places at once, default poses, clips, history, and clocks half a stride off.
 """
 
 from __future__ import annotations
