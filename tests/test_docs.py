@@ -280,7 +280,7 @@ def test_every_command_has_its_section_with_its_help() -> None:
 
 
 def test_the_configuration_example_loads_and_changes_what_it_names(tmp_path: Path) -> None:
-    (block,) = [block for name in DOCS for block in blocks(name, "toml")]
+    (block,) = blocks("docs/how-to/configuration.md", "toml")
     file = tmp_path / "mine.toml"
     file.write_text(block.text, encoding="utf-8")
     config = load_config(file)
