@@ -138,7 +138,8 @@ def test_a_draft_is_given_up(tab: Tab, file: Path) -> None:
     field.press_sequentially("14")
     tab.wait_for(f"{SAID} === 'not saved yet'")
     tab.page.keyboard.press("Escape")
-    tab.wait_for("studio.selected === null")
+    tab.wait_for(f"studio.selected === null && {SAID} === 'as it is saved'")
+    _settle(tab)
     assert file.read_text(encoding="utf-8") == GREET
 
 

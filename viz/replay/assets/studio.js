@@ -231,9 +231,9 @@ class Studio {
     if (event.key.toLowerCase() === "b" && !event.ctrlKey && !event.target.matches("input, select")) this.play();
     if (event.key === "Escape" && this.selected !== null) {
       this.selected = null;
-      document.activeElement.blur();
+      this.waiting = null;
+      this.inspector.giveUp();
       if (this.say.textContent === "not saved yet") this.tell("as it is saved");
-      this.inspector.forget();
       this.reload();
     }
     if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z") return;

@@ -29,6 +29,15 @@ class Inspector {
     return null;
   }
 
+  // What is typed is not meant: leaving the field would save it.
+  giveUp() {
+    this.isGivenUp = true;
+    clearTimeout(this.resting);
+    document.activeElement.blur();
+    this.isGivenUp = false;
+    this.forget();
+  }
+
   // The next call is shown anew, whatever is typed into.
   forget() {
     this.shape = "";
@@ -67,7 +76,7 @@ class Inspector {
       clearTimeout(this.resting);
       if (!isWord) this.resting = setTimeout(() => send(false), DRAFT_REST);
     });
-    input.addEventListener("change", () => send(true));
+    input.addEventListener("change", () => this.isGivenUp || send(true));
     const note = slot.place ? `${unitOf(slot, timeUnit)} · ${slot.place}` : unitOf(slot, timeUnit);
     row.append(input, element("small", { textContent: note, title: note }));
     return row;
