@@ -144,7 +144,7 @@ class GO2Controller:
 
     # --- walking --------------------------------------------------------------------------
 
-    @typed("policy", error=CommandError)
+    @typed(error=CommandError)
     def walk(self, gait: Gait | str = "trot", *, policy: Path | Policy | str | None = None) -> bool:
         """Enter walking mode; the robot stands ready until ``move``. Stands up first if needed.
 

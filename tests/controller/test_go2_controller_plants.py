@@ -92,7 +92,7 @@ ARGUMENTS = {
     **dict.fromkeys(("wait", "move_forward", "turn_left", "turn_right"), (1.0,)),
     "play": ("high_five",),
 }
-ALLOWED = {"close", "destroy_node", "prepare", "recording"}
+ALLOWED = {"close", "destroy_node", "explain", "prepare", "recording"}
 """What may still be called."""
 CALLS = [
     name
