@@ -17,6 +17,7 @@ from go2_wbc import (
     LEGS,
     Config,
     ContactSchedule,
+    Explanation,
     Gait,
     Go2WbcError,
     JointCommand,
@@ -185,6 +186,8 @@ def engine(plan: MotionPlan) -> JointCommand:
     config = load_config("go2.toml").wbc
     wbc = WholeBodyController(model, config=config, extra_tasks=[Load()])
     solution: WbcSolution = wbc.solve(snapshot, reference)
+    why: Explanation = solution.explain()
+    print([limit.multiplier for limit in why.binding], why)
     print(gait.period, leg.name, schedule, planner, JointReference, np.abs(solution.tau).max())
     return JointCommand.torque(np.zeros(12))
 
