@@ -186,7 +186,7 @@ class ControlLoop:
         """
         if self._asked is None:
             doing = self.behaviour.label
-            raise ModeError(f"nothing to explain: the robot is {doing}, without the whole-body QP")
+            raise ModeError(f"nothing to explain: the whole-body QP has no part in {doing!r}")
         wbc, snapshot, target = self._asked
         return wbc.formulate(snapshot, target)
 

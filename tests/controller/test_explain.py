@@ -44,14 +44,14 @@ def test_being_asked_changes_nothing_and_what_is_said_is_what_is_recorded() -> N
 
 def test_a_robot_that_does_not_balance_has_nothing_to_explain() -> None:
     with GO2Controller() as go2:
-        with pytest.raises(ModeError, match="lying, without the whole-body QP"):
+        with pytest.raises(ModeError, match="QP has no part in 'lying'"):
             go2.explain()
         go2.telemetry.explains = True
         assert go2.stand()
         assert str(go2.explain()) == "no limit binds"
         go2.damp()
         go2.wait(0.01)
-        with pytest.raises(ModeError, match="damped, without"):
+        with pytest.raises(ModeError, match="no part in 'damped'"):
             go2.explain()
         recording = go2.recording(rate=500.0)
     is_limp = np.asarray(np.isnan(recording.multipliers).all(axis=1))
