@@ -19,7 +19,7 @@ from go2_wbc.planning.sight import (
     STOP,
     way_ahead,
 )
-from go2_wbc.planning.sighted_steps import NEAR, OVER
+from go2_wbc.planning.sighted_steps import NEAR, OVER, choose
 from go2_wbc.plant.terrain import DOWN, Blocks, Gap, Ramp, Slope, Stairs, Stones, Terrain
 from go2_wbc.reference import SWING
 from go2_wbc.robot.model import RobotModel
@@ -172,6 +172,25 @@ def test_feet_are_put_beside_edges_and_swing_over_them(start: float, kind: str) 
                 assert distance_to_edge(terrain, step.chosen) > NEAR - 0.015
     assert landed > 10
     assert swung > 100
+
+
+@pytest.mark.parametrize(("gone_on", "waits"), [(0.02, True), (0.06, True), (0.12, False)])
+@pytest.mark.parametrize("leg", [0, 2])
+def test_a_foot_waits_on_a_high_step_until_its_hip_has_gone_on(
+    leg: int, gone_on: float, waits: bool
+) -> None:
+    """The hip is 21 cm over the step: if it is no farther, the calf comes down on the edge."""
+    edge, hip = 0.20, MODEL.p_base_hips[leg]
+    heights = exact_map(Stairs(0.20, 1, 0.31, start=edge, way=DOWN))
+    walking, q = planner(heights), standing_q(0.21)
+    state = walking._state
+    state.trunk.velocity[0] = 0.3
+    q[0] = edge + gone_on - 0.3 * 0.25 - hip[0]  # touchdown is in 0.25 s
+    state.feet[leg].swing.start[:] = edge - 0.05, 1.7 * hip[1], FOOT
+    blind = np.array([edge + gone_on + 0.04, 1.7 * hip[1], FOOT - 0.1])
+    now = MODEL.snapshot(state_of(q))
+    choose(leg, now, state, walking._walk, heights, (0.0, 0.25), blind, math.inf)
+    assert (state.feet[leg].step.chosen[0] < edge) == waits
 
 
 def test_a_trunk_that_sways_drags_no_foot_over_an_edge() -> None:
