@@ -196,7 +196,9 @@ def test_a_policy_of_anybody_walks_and_hands_over(path: Path, go2: GO2Controller
 
 @pytest.mark.parametrize("path", [TROT, *OTHERS], ids=lambda path: path.stem)
 @pytest.mark.parametrize("sensors", ["ideal", "imu"])
-def test_a_policy_walks_in_another_authors_file_whose_joints_brake(path: Path, sensors: str) -> None:
+def test_a_policy_walks_in_another_authors_file_whose_joints_brake(
+    path: Path, sensors: str
+) -> None:
     # With 2 N m s/rad, as Menagerie has it, the clone's legs hardly swung: it fell.
     plant = MujocoPlant(menagerie_go2(), sensors=sensors)
     with GO2Controller(plant=plant) as go2:
