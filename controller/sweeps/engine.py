@@ -287,7 +287,7 @@ class Worker:
 
         Args:
             order: its function.
-            memory: ``RawArray``s that the function is called with, behind the item.
+            memory: shared with it (``RawArray``); the function is called with it, behind the item.
         """
         context = multiprocessing.get_context("forkserver" if sys.platform == "linux" else "spawn")
         self._pipe, its_end = context.Pipe()
