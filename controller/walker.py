@@ -81,7 +81,9 @@ class Walker:
             self._envelope = policy.sidecar.commands
         walking.command = self._envelope.clip(walking.command)
         if policy is not None:
-            walking.learned = Learned(policy, self._runner.loop.model)
+            loop = self._runner.loop
+            viscous = loop.wbc.config.joint_friction.viscous
+            walking.learned = Learned(policy, loop.model, viscous)
 
     @property
     def refusal(self) -> str:

@@ -38,12 +38,13 @@ LIMIT_ROWS = (
     *(f"{leg.name} {what}" for leg in LEGS for what in _FEET),
     *(f"{joint} torque" for joint in _JOINTS),
     *(f"{joint} acceleration" for joint in _JOINTS),
+    *(f"{leg.name} contact" for leg in LEGS),
 )
 """What each column of ``Recording.multipliers`` is of (``wbc.constraints.Multipliers``)."""
 CONTRADICTION = "limits contradict each other"
 
 
-def _limits() -> dict[str, Callable[[Float[np.ndarray, "n 44"]], Bool[np.ndarray, " n"]]]:
+def _limits() -> dict[str, Callable[[Float[np.ndarray, "n 48"]], Bool[np.ndarray, " n"]]]:
     """What users call a limit, and where multipliers say that it binds."""
     found = dict[str, Callable[..., Any]]()
     for leg in LEGS:
@@ -54,6 +55,8 @@ def _limits() -> dict[str, Callable[[Float[np.ndarray, "n 44"]], Bool[np.ndarray
     for n, joint in enumerate(_JOINTS):
         found[f"torque limit of {joint}"] = lambda y, k=20 + n: np.abs(y[:, k]) > 0.0
         found[f"end or speed of {joint}"] = lambda y, k=32 + n: np.abs(y[:, k]) > 0.0
+    for leg in LEGS:
+        found[f"contact of {leg.name}"] = lambda y, k=44 + leg: np.abs(y[:, k]) > 0.0
     return found
 
 
@@ -94,7 +97,7 @@ class Recording:
         model_file: its own MJCF or URDF, by which it is drawn; empty if it has none.
         ground: (k, 3) middles of the cells of ground that it has seen, each as it was found last
             [m]; none of a blind robot.
-        multipliers: (n, 44) of the limits of the whole-body QP, of each the strongest since the
+        multipliers: (n, 48) of the limits of the whole-body QP, of each the strongest since the
             sample (``LIMIT_ROWS`` says which); nan where it did not run. None unless the robot
             recorded them (``go2.telemetry.explains``).
         gave_way: (n,) whether limits contradicted each other, so that some gave way; as above.
@@ -112,7 +115,7 @@ class Recording:
     robot: str = "go2"
     model_file: str = ""
     ground: Float[np.ndarray, "k 3"] = field(default_factory=partial(np.empty, (0, 3)))
-    multipliers: Float[np.ndarray, "m 44"] = field(default_factory=partial(np.empty, (0, 44)))
+    multipliers: Float[np.ndarray, "m 48"] = field(default_factory=partial(np.empty, (0, 48)))
     gave_way: Bool[np.ndarray, " m"] = field(default_factory=partial(np.empty, 0, bool))
 
     _repr_html_ = inline_html

@@ -4,7 +4,10 @@ The planner of the walk goes on in the shadow of the policy: its references are 
 state, and its clock follows the feet, each time one comes down. So the whole-body controller can
 take over in any tick. While one hands over to the other, the torques of both are mixed:
 
-    tau = (1 - s) tau_wbc + s (kp (q_des - q) - kd v)       s: the share of the policy
+    tau = (1 - s) tau_wbc + s (kp (q_des - q) - kd v + f v)     s: the share of the policy
+
+where f is the joints' viscous friction that is fed forward: 0, but where the robot's own file has
+much of it, which no policy has met in training.
 
 The policy has the robot while there is a command; without one the whole-body controller lets it
 come to rest, and stand.
@@ -13,6 +16,8 @@ come to rest, and stand.
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool
@@ -43,11 +48,17 @@ class Learned:
         refusal: why it may not go on, in plain words; "" if it may.
     """
 
-    def __init__(self, policy: Policy, model: RobotModel) -> None:
-        """Let ``policy`` drive ``model``, from the next command on."""
+    def __init__(self, policy: Policy, model: RobotModel, viscous: Sequence[float]) -> None:
+        """Let ``policy`` drive ``model``, from the next command on.
+
+        Args:
+            policy: what walks.
+            model: of the robot.
+            viscous: friction of each joint [N m s/rad] that is fed forward.
+        """
         self.policy, self.is_wanted, self.share, self.refusal = policy, True, 0.0, ""
         self._player = Player(policy, model.q_lower, model.q_upper)
-        self._time = np.nan
+        self._time, self._viscous = np.nan, np.array(viscous)
         self._in_air_since = np.full(4, np.inf)
 
     @property
@@ -75,7 +86,9 @@ class Learned:
             return reference
         planner.follow_feet(landed, FOLLOWED)
         try:
-            return Shared(reference, self._player.command(state, command), self.share)
+            asked = self._player.command(state, command)
+            asked = replace(asked, tau=self._viscous * state.joint_velocities)
+            return Shared(reference, asked, self.share)
         except PolicyError as error:
             self.refusal, self.share = f"{error} at t={state.time:.2f} s", 0.0
             _log.warning("%s: the whole-body controller takes over", self.refusal)

@@ -8,6 +8,7 @@ is built anew but for another terrain. All that is random comes from the seed of
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -76,6 +77,7 @@ class Go2Env(gymnasium.Env[Seen, np.ndarray]):
         kd: float = KD,
         episode_time: float = 20.0,
         render_mode: str | None = None,
+        mjcf: Path | str | None = None,
     ) -> None:
         """An environment that is reset before its first step.
 
@@ -88,9 +90,12 @@ class Go2Env(gymnasium.Env[Seen, np.ndarray]):
             kp, kd: of the servo [N m/rad], [N m s/rad].
             episode_time: after which an episode is truncated [s].
             render_mode: None or "rgb_array".
+            mjcf: file of a Go2 of your own, as ``MujocoPlant`` takes it, on the ground that it has.
 
         Raises:
-            CommandError: for an unknown name, or a number out of range.
+            CommandError: for an unknown name, a number out of range, or a task with terrains
+                together with an ``mjcf``.
+            ModelMismatch: if ``mjcf`` is no Go2.
             MissingDependency: without Gymnasium.
         """
         if sensors not in SENSORS:
@@ -100,7 +105,9 @@ class Go2Env(gymnasium.Env[Seen, np.ndarray]):
         if not (kp >= 0.0 and kd >= 0.0 and episode_time > 0.0):
             raise CommandError(f"kp, kd and episode_time must be positive: {kp, kd, episode_time}")
         own, self._sensors = find_task(task), sensors
-        self.task = own if randomise else own.exact
+        self.task, self._mjcf = own if randomise else own.exact, mjcf
+        if mjcf is not None and own.terrains:
+            raise CommandError(f"task {own.name!r} has terrains, an mjcf brings its own ground")
         self.layout = OBSERVATION.chosen(terms)
         limits = self.layout.limits
         self.observation_space = Box(-limits, limits, dtype=np.float32)
@@ -181,7 +188,7 @@ class Go2Env(gymnasium.Env[Seen, np.ndarray]):
         from viz.render.snapshots import SnapshotCamera
 
         if self._camera is None:
-            self._camera = SnapshotCamera()
+            self._camera = SnapshotCamera(model_file=self._plant.model_file)
         terrains = self.task.terrains
         number = next(n for n, (plant, _) in self._plants.items() if plant is self._plant)
         blocks = terrains[number].blocks() if terrains else ()
@@ -209,7 +216,8 @@ class Go2Env(gymnasium.Env[Seen, np.ndarray]):
             terrains = self.task.terrains
             terrain = terrains[number] if terrains else None
             period, sensors = 1.0 / RATE, self._sensors
-            plant = MujocoPlant(control_period=period, terrain=terrain, sensors=sensors)
+            world = {"terrain": terrain, "sensors": sensors}
+            plant = MujocoPlant(self._mjcf, control_period=period, **world)
             self._plants[number] = plant, plant.save()
         return self._plants[number]
 

@@ -8,79 +8,105 @@ ignores (Gymnasium's ``AutoresetMode.NEXT_STEP``).
 from __future__ import annotations
 
 import pickle
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from multiprocessing.sharedctypes import RawArray
 from multiprocessing.util import Finalize
 from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, UInt8
 
-from controller.learning.environment import FRAMES, Go2Env, Info, Step, gymnasium
+from controller.learning.environment import FRAMES, Go2Env, Info, gymnasium
 from controller.observation import RATE
 from controller.sweeps.engine import Worker, order_of, processors
 from go2_wbc.errors import CommandError, SweepError
 
 Rows = Float32[np.ndarray, "_ _"]
 Flags = Bool[np.ndarray, " _"]
+Memory = tuple[Any, Any, Any]
+"""What all processes see: actions, observations, and what else steps tell, see ``Board``."""
+STEP = pickle.dumps(("step", None))
+
+
+class Board:
+    """Rows of numbers in memory that all processes see, one for each environment.
+
+    Attributes:
+        actions: what is to be done.
+        seen: observations.
+        told: reward, is over, is cut, command (3), terms of the reward.
+    """
+
+    def __init__(self, memory: Memory, count: int) -> None:
+        """The ``memory`` of ``count`` environments."""
+        actions, seen, told = memory
+        self.actions = np.frombuffer(actions, dtype=np.float32).reshape(count, -1)
+        self.seen = np.frombuffer(seen, dtype=np.float32).reshape(count, -1)
+        self.told = np.frombuffer(told, dtype=np.float64).reshape(count, -1)
+
+    @staticmethod
+    def memory(count: int, size: int, terms: int) -> Memory:
+        """For observations of ``size`` numbers, and so many terms of the reward.
+
+        It has no name, so nothing is left of it when the last process ends, however that came.
+        """
+        return (
+            RawArray("f", count * 12),
+            RawArray("f", count * size),
+            RawArray("d", count * (6 + terms)),
+        )
 
 
 class Share:
     """The environments of one worker, made where they are first needed."""
 
-    def __init__(self, count: int, settings: dict[str, Any]) -> None:
-        """``count`` of them, with these ``settings`` of ``Go2Env``."""
-        self._count, self._settings = count, settings
+    def __init__(self, numbers: Sequence[int], count: int, settings: dict[str, Any]) -> None:
+        """Those with these ``numbers``, of ``count`` in all, with ``settings`` of ``Go2Env``."""
+        self._numbers, self._count, self._settings = numbers, count, settings
         self._environments: list[Go2Env] = []
-        self._are_over = [False] * count
+        self._are_over = [False] * len(numbers)
 
-    def __call__(self, asked: tuple[str, Any]) -> Any:  # noqa: ANN401
+    def __call__(self, asked: tuple[str, Any], memory: Memory) -> Any:  # noqa: ANN401
         """What they give.
 
         Args:
-            asked: ("step", actions) gives rows of numbers, see ``_row``, and what those
-                tell by number that are reset instead; ("reset", seeds and options) and ("render",
-                None) what ``Go2Env`` gives, one after the other.
+            asked: ("step", None) puts what comes of the actions on the board, and gives what those
+                tell, by number, that are reset instead; ("reset", seeds and options) and ("render",
+                None) give what ``Go2Env`` does, one after the other.
+            memory: of the board.
 
         Raises:
             CommandError: as ``Go2Env``.
         """
         if not self._environments:
-            self._environments = [Go2Env(**self._settings) for _ in range(self._count)]
+            self._environments = [Go2Env(**self._settings) for _ in self._numbers]
+            self._board = Board(memory, self._count)
         what, given = asked
         if what == "render":
             return [environment.render() for environment in self._environments]
         if what == "step":
             told: dict[int, Info] = {}
-            actions = np.frombuffer(given, dtype=np.float32).reshape(-1, 12)
-            rows = [self._step(number, action, told) for number, action in enumerate(actions)]
-            return np.array(rows).tobytes(), told
+            for place, number in enumerate(self._numbers):
+                self._step(place, number, told)
+            return told
         seeds, options = given
-        self._are_over = [False] * self._count
+        self._are_over = [False] * len(self._numbers)
         pairs = zip(self._environments, seeds, strict=True)
         return [environment.reset(seed=seed, options=options) for environment, seed in pairs]
 
-    def _step(
-        self, number: int, action: Float32[np.ndarray, "12"], told: dict[int, Info]
-    ) -> Float[np.ndarray, " k"]:
-        environment = self._environments[number]
-        if self._are_over[number]:
-            self._are_over[number] = False
+    def _step(self, place: int, number: int, told: dict[int, Info]) -> None:
+        environment, board = self._environments[place], self._board
+        if self._are_over[place]:
+            self._are_over[place] = False
             seen, told[number] = environment.reset()
-            gains = dict.fromkeys(environment.task.weights, 0.0)
-            return _row((seen, 0.0, False, False, {**told[number], "reward_terms": gains}))
-        step = environment.step(action)
-        self._are_over[number] = step[2] or step[3]
-        return _row(step)
-
-
-def _row(step: Step) -> Float[np.ndarray, " k"]:
-    """A step as numbers: reward, is over, is cut, command, terms of the reward, observation.
-
-    Quicker to send than a tuple with dictionaries, and to put together with others.
-    """
-    seen, reward, is_over, is_cut, info = step
-    gains = info["reward_terms"].values()
-    return np.concatenate([[reward, is_over, is_cut, *info["command"], *gains], seen])
+            board.told[number] = 0.0
+            board.told[number, 3:6] = environment.command
+        else:
+            seen, reward, is_over, is_cut, info = environment.step(board.actions[number])
+            self._are_over[place] = is_over or is_cut
+            gains = info["reward_terms"].values()
+            board.told[number] = [reward, is_over, is_cut, *info["command"], *gains]
+        board.seen[number] = seen
 
 
 class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
@@ -118,7 +144,7 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
         one = Go2Env(**settings)
         one.close()
         self.num_envs, self.render_mode = num_envs, one.render_mode
-        self._size, self._terms = one.layout.size, [*one.task.weights]
+        self._terms = [*one.task.weights]
         self.single_observation_space, self.single_action_space = (
             one.observation_space,
             one.action_space,
@@ -127,8 +153,11 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
         self.observation_space = batch(one.observation_space, num_envs)
         self.action_space = batch(one.action_space, num_envs)
         self._shares = np.array_split(np.arange(num_envs), min(workers or processors(), num_envs))
-        shares = [Share(len(part), settings) for part in self._shares]
-        self._own, self._workers = shares[-1], [Worker(order_of(share)) for share in shares[:-1]]
+        shares = [Share(part.tolist(), num_envs, settings) for part in self._shares]
+        self._memory = Board.memory(num_envs, one.layout.size, len(self._terms))
+        self._board, self._own = Board(self._memory, num_envs), shares[-1]
+        self._workers = [Worker(order_of(share), self._memory) for share in shares[:-1]]
+        self._trouble = ""  # why they cannot be stepped any more
         # Also of one that nobody closes: Python would wait for them at its exit.
         self._end = Finalize(self, _end_all, [self._workers], exitpriority=0)
 
@@ -153,7 +182,8 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
         if len(seeds) != self.num_envs:
             raise CommandError(f"{self.num_envs} environments want as many seeds, got {len(seeds)}")
         parts = [([seeds[number] for number in part], options) for part in self._shares]
-        given = [one for part in self._asked("reset", parts) for one in part]
+        *orders, own = [("reset", part) for part in parts]
+        given = [one for part in self._asked(map(pickle.dumps, orders), own) for one in part]
         info: Info = {}
         for number, (_, own) in enumerate(given):
             info = self._add_info(info, own, number)
@@ -169,35 +199,55 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
         actions = np.asarray(actions, dtype=np.float32)
         if actions.shape != (self.num_envs, 12):
             raise CommandError(f"actions must be ({self.num_envs}, 12), got {actions.shape}")
-        given = self._asked("step", [actions[part].tobytes() for part in self._shares])
-        flat = np.frombuffer(b"".join(rows for rows, _ in given))
-        columns = flat.reshape(self.num_envs, -1).T.copy()  # each in memory of its own
-        seen = columns[-self._size :].T.astype(np.float32, order="C")
+        self._board.actions[:] = actions
+        given = self._asked([STEP] * len(self._workers), ("step", None))
+        columns = self._board.told.T.copy()  # each in memory of its own
         ends, cuts = columns[1:3].astype(bool)
         info = self._info(columns)
-        for part, (_, told) in zip(self._shares, given, strict=True):
+        for told in given:
             for number, own in told.items():  # of those that were reset instead
-                info["_reward_terms"][part[number]] = False
-                info = self._add_info(info, own, int(part[number]))
-        return seen, columns[0], ends, cuts, info
+                info["_reward_terms"][number] = False
+                info = self._add_info(info, own, number)
+        return self._board.seen.copy(), columns[0], ends, cuts, info
 
     def render(self) -> tuple[UInt8[np.ndarray, "h w 3"], ...] | None:
         """A picture of each, if ``render_mode`` asks for it."""
         if self.render_mode is None:
             return None
-        given = self._asked("render", [None] * len(self._shares))
+        order = ("render", None)
+        given = self._asked([pickle.dumps(order)] * len(self._workers), order)
         return tuple(picture for part in given for picture in part)
 
     def close_extras(self, **_: object) -> None:
         """End the processes."""
+        self._trouble = "the environments are closed"
         self._end()
 
-    def _asked(self, what: str, parts: Sequence[object]) -> list[Any]:
-        """What each share gives, all at the same time."""
-        for worker, part in zip(self._workers, parts[:-1], strict=True):
-            worker.give(pickle.dumps((what, part)))
-        own = self._own((what, parts[-1]))
-        return [*map(_answered, self._workers), own]
+    def _asked(self, items: Iterable[bytes], own: tuple[str, Any]) -> list[Any]:
+        """What each share gives, all at the same time; ``items`` are for the workers."""
+        if self._trouble:
+            raise SweepError(f"{self._trouble}: make them anew")
+        self._trouble = "a step of the environments was interrupted"
+        for worker, item in zip(self._workers, items, strict=True):
+            worker.give(item)
+        try:
+            given = self._own(own, self._memory)
+        finally:  # whatever came of the own: nobody may wait for these with the next step
+            answers = [worker.wait() for worker in self._workers]
+            self._trouble = ""
+        return [*map(self._answered, range(len(answers)), answers), given]
+
+    def _answered(self, number: int, answer: bytes | None) -> Any:  # noqa: ANN401
+        """What a worker has answered."""
+        if answer is None:
+            part, how = self._shares[number].tolist(), self._workers.pop(number).end()
+            self._end()
+            self._trouble = f"the process of environments {part} has died ({how})"
+            raise SweepError(f"{self._trouble}: make them anew")
+        value, failure = pickle.loads(answer)
+        if failure is not None:
+            raise SweepError(f"{failure.text}\n{failure.details}")
+        return value
 
     def _info(self, columns: Float[np.ndarray, "k n"]) -> Info:
         """What Gymnasium's ``_add_info`` would make of the ``info`` of all."""
@@ -216,13 +266,3 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
 def _end_all(workers: Sequence[Worker]) -> None:
     for worker in workers:
         worker.end()
-
-
-def _answered(worker: Worker) -> Any:  # noqa: ANN401
-    answer = worker.wait()
-    if answer is None:
-        raise SweepError("a worker of the environments has died: make them anew")
-    value, failure = pickle.loads(answer)
-    if failure is not None:
-        raise SweepError(f"{failure.text}\n{failure.details}")
-    return value

@@ -113,7 +113,7 @@ class Engine(ABC):
 _HERE = Path(__file__).parent
 
 
-def order_of(function: Callable[[Any], Any]) -> bytes:
+def order_of(function: Callable[..., Any]) -> bytes:
     """The message that tells a worker what to call, and where to look for it."""
     return pickle.dumps((sys.path, pickle.dumps(function)))
 
@@ -126,10 +126,10 @@ def answer(order: bytes, item: bytes) -> bytes:
         tidy_up()
 
 
-def reply(order: bytes, item: bytes) -> bytes:
+def reply(order: bytes, item: bytes, *memory: object) -> bytes:
     """The message that says what came of an item: the value, or the ``Failure``."""
     try:
-        return pickle.dumps((_ordered(order)(pickle.loads(item)), None))
+        return pickle.dumps((_ordered(order)(pickle.loads(item), *memory), None))
     except (Exception, SystemExit) as error:
         text = traceback.format_exception_only(error)[-1].strip()
         return pickle.dumps((None, Failure(text, _told(error))))
@@ -156,16 +156,17 @@ _keep_the_rest = cache(gc.freeze)
 
 
 @lru_cache(maxsize=1)
-def _ordered(order: bytes) -> Callable[[Any], Any]:
+def _ordered(order: bytes) -> Callable[..., Any]:
     """The function of an order: unpickled once, so that what it keeps is kept."""
     path, function = pickle.loads(order)
     sys.path += [place for place in path if place not in sys.path]  # after one's own
     return pickle.loads(function)
 
 
-def serve(pipe: Connection, order: bytes, environment: Mapping[str, str]) -> None:
+def serve(pipe: Connection, order: bytes, environment: Mapping[str, str], *memory: object) -> None:
     """Answer what comes through ``pipe``, as a process that was started anew with ``environment``.
 
+    The function is called with the ``memory`` that it shares with the parent, if there is any.
     Until the parent closes the pipe, or ends.
     """
     if sys.flags.hash_randomization:
@@ -184,7 +185,7 @@ def serve(pipe: Connection, order: bytes, environment: Mapping[str, str]) -> Non
         random.seed()  # Python's own numbers are seeded anew by a fork
     with suppress(EOFError):
         while True:
-            pipe.send_bytes(reply(order, awaited(pipe)))
+            pipe.send_bytes(reply(order, awaited(pipe), *memory))
             tidy_up()  # while nobody waits
 
 
@@ -281,11 +282,16 @@ class Worker:
             ended.
     """
 
-    def __init__(self, order: bytes) -> None:
-        """Start it, in the folder and environment of this process; ``order`` is its function."""
+    def __init__(self, order: bytes, *memory: object) -> None:
+        """Start it, in the folder and environment of this process.
+
+        Args:
+            order: its function.
+            memory: shared with it (``RawArray``); the function is called with it, behind the item.
+        """
         context = multiprocessing.get_context("forkserver" if sys.platform == "linux" else "spawn")
         self._pipe, its_end = context.Pipe()
-        arguments = (its_end, order, {**os.environ, **ONE_THREAD})
+        arguments = (its_end, order, {**os.environ, **ONE_THREAD}, *memory)
         self._process = context.Process(target=serve, args=arguments, name="worker")
         with its_end, _start():
             try:

@@ -45,9 +45,10 @@ else they may turn by [rad/s]: one that lies down on slippery ground slides by 0
 JUMP, SEEN, JUMP_LASTS, LONGEST_JUMP = 0.3, 0.4, 0.03, 0.25
 """Change of the gyro from one reading to the next [rad/s] that may be an error; what feet that do
 not jump along have to show of it [m^2/s^2], for how long at least [s], and at most."""
-SHAKEN = 0.01
-"""Time [s] before and after which no foot has landed: one that strikes the edge of a step jerks the
-trunk, and then slides. 2 of 20 sound gyros were accused of it on stairs of 13 cm."""
+SHAKEN, SHAKEN_LASTS = 0.01, 0.06
+"""Time [s] after a landing, twice as long before, in which a jump may be its: a foot on the edge of
+a step jerks the trunk, and then slides; 2 of 20 sound gyros were accused of it on stairs of 13 cm.
+How long [s] feet have to show it then: to a sound one they have lent 0.03 of ``SEEN`` at most."""
 GOES_ON = 0.25
 """Share of it by which the reading before or after changes alike, if it is the turning that has: a
 foot that comes down hard turns the trunk for several."""
@@ -92,6 +93,7 @@ class WatchedImu(Record):
         refining: for how long what is left is still measured [s].
         change: of the gyro from the last reading but one to the last [rad/s].
         jump, jump_time: the last of the gyro [rad/s], and for how long it is looked at [s].
+        jump_lasts: how long feet have to show it [s].
         jump_seen, jump_lacks, jump_residual: sums of f . f, f . e and e . e, where feet that stand
             would seem to move apart by f, if it were an error, and do so by e [m^2/s^2].
         any_seen, any_lacks: the first two with feet that have just landed.
@@ -118,6 +120,7 @@ class WatchedImu(Record):
     change: Array3
     jump: Array3
     jump_time: float
+    jump_lasts: float
     jump_seen: float
     jump_lacks: float
     jump_residual: float
@@ -243,17 +246,19 @@ def judge_jump(m: WatchedImu, change: V3, is_shaken: bool, dt: float) -> None:
     """Take off what the gyro has jumped by since the last reading if the feet lack it for a while.
 
     With f and e of each pair the share that they lack is sum f . e / sum f . f, least squares. What
-    a landing turns goes on to turn in the next reading. An error that begins while the robot
-    ``is_shaken``, as a foot has just landed, is left to ``judge_gyro``.
+    a landing turns goes on to turn in the next reading. A jump while the robot ``is_shaken``, as a
+    foot has just landed, is looked at for longer, and feet count that have landed for a while.
     """
     last, jump, size = triple(m.change), triple(m.jump), dot(change, change)
     if m.jump_time < 1.5 * dt and dot(change, jump) > GOES_ON * dot(jump, jump):
         m.jump_time = 0.0
-    if is_shaken and m.jump_time <= SHAKEN:
-        m.jump_time = 0.0
+    if is_shaken and m.jump_time <= 2.0 * SHAKEN:
+        m.jump_lasts = SHAKEN_LASTS
+    if is_shaken and m.jump_lasts == SHAKEN_LASTS:
+        m.any_seen = m.any_lacks = 0.0
     if m.jump_time > 0.0:
         m.jump_time += dt
-        is_told = m.jump_seen > SEEN and m.jump_time > JUMP_LASTS
+        is_told = m.jump_seen > SEEN and m.jump_time > m.jump_lasts
         explains = m.jump_lacks**2 > JUMP_EXPLAINED * m.jump_seen * m.jump_residual
         share = m.jump_lacks / m.jump_seen if m.jump_seen > 0.0 else 1.0
         any_share = m.any_lacks / m.any_seen if m.any_seen > 0.0 else 1.0
@@ -264,9 +269,9 @@ def judge_jump(m: WatchedImu, change: V3, is_shaken: bool, dt: float) -> None:
             m.jump_time = 0.0
     has_begun = dot(change, last) > GOES_ON * size
     put(change, m.change)
-    may_be_error = m.stood >= CALM and not is_shaken and not has_begun
-    if m.jump_time == 0.0 and may_be_error and size > JUMP**2:
+    if m.jump_time == 0.0 and m.stood >= CALM and not has_begun and size > JUMP**2:
         put(change, m.jump)
+        m.jump_lasts = SHAKEN_LASTS if is_shaken else JUMP_LASTS
         m.jump_time, m.jump_seen, m.jump_lacks, m.jump_residual = dt, 0.0, 0.0, 0.0
         m.any_seen = m.any_lacks = 0.0
 

@@ -50,6 +50,7 @@ from go2_wbc.wbc.constraints import (
     fill_limits,
     left_over,
 )
+from go2_wbc.wbc.contact_prices import is_hasty, price_contacts
 from go2_wbc.wbc.tasks import LEG_ROWS, TASK_ROWS, BuiltInTasks, TaskRows, fill_tasks
 
 SINGULAR_DETERMINANT = 2e-4
@@ -204,7 +205,8 @@ class Decision(Record):
     z: Array30  #: see ``problem``
     tau: Array12  #: joint torques [N m] without friction
     tau_motors: Array12  #: those that the motors are told [N m]
-    multipliers: Multipliers  #: of the inequalities; all 0 if the tick met them by itself
+    multipliers: Multipliers
+    """Of the inequalities, all 0 if the tick met them by itself; and of contacts."""
 
 
 class Workspace(Record):
@@ -385,6 +387,36 @@ def solve_bounded(target: Target, w: Workspace, multipliers: Multipliers) -> int
 
 
 @subroutine
+def slope_of(
+    extra: Float[np.ndarray, "k 32"], w: Workspace, d: Decision
+) -> Float[np.ndarray, "18"]:
+    """How cost and limits, with their multipliers, rise with the accelerations at a decision."""
+    slope, rows, z, y = np.zeros(18), w.tasks, d.z, d.multipliers
+    for n in range(TASK_ROWS):
+        rest = -rows.b[n]
+        for k in range(6):
+            rest += rows.A[n, k] * z[k]
+        for k in range(12):
+            rest += rows.A[n, 6 + k] * w.u[k]
+        for k in range(6):
+            slope[k] += rows.weight[n] * rest * rows.A[n, k]
+    for n in range(len(extra)):
+        rest = -extra[n, 30]
+        for k in range(30):
+            rest += extra[n, k] * z[k]
+        for k in range(18):
+            slope[k] += extra[n, 31] * rest * extra[n, k]
+    for n in range(12):
+        first, T = 6 + 3 * (n // 3), w.limits.torques[n]
+        for k in range(6):
+            slope[k] += y.torques[n] * T[k]
+        for k in range(3):
+            slope[first + k] += y.torques[n] * T[6 + k]
+        slope[6 + n] += y.joints[n]
+    return slope
+
+
+@subroutine
 def is_finite(row: Float[np.ndarray, " n"]) -> bool:
     """Whether every number is finite. Without branches it takes a fifth."""
     count = 0
@@ -442,5 +474,11 @@ def solve_tick(
         outcome = solve_bounded(target, w, decision.multipliers)
         decide(target, w.reduction, w.u, decision.z)
         fill_tau(w.limits, decision.z, decision.tau)
+    still, r = c.constraints.still, w.reduction
+    for leg in range(4):
+        if is_hasty(now, target, still, leg):
+            slope, prices = slope_of(extra, w, decision), decision.multipliers.contacts
+            price_contacts(now, target, still, slope, r.dynamics.A, r.legs, prices)
+            break
     fill_motor_torques(now, c.friction, decision.z, decision.tau, decision.tau_motors)
     return outcome

@@ -64,15 +64,18 @@ class Limits(Record):
 
 
 class Multipliers(Record):
-    """The multiplier of every inequality, in the places of ``Limits``, per unit of its row.
+    """The multiplier of every inequality, in the places of ``Limits``, and of hasty contacts.
 
     By how much the least cost sum w |A z - b|^2 / 2 falls for a row that is one unit wider;
-    positive where its upper side binds, negative where the lower one does, 0 where none does.
+    positive where its upper side binds, negative where the lower one does, 0 where none does. So a
+    contact's is negative if the cost falls where the foot is stopped by less.
     """
 
     forces: Float[np.ndarray, "4 5"]  #: [1/N]
     torques: Array12  #: [1/(N m)]
     joints: Array12  #: [s^2/rad]
+    contacts: Float[np.ndarray, "4"]
+    """[s^2/m] of the acceleration that stops a foot; 0 where ``contact_prices`` has none."""
 
 
 class BaseRows(Record):

@@ -42,6 +42,7 @@ from go2_wbc.records import Array30
 from go2_wbc.reference import LegTask
 from go2_wbc.wbc.backends import dense_qp
 from go2_wbc.wbc.constraints import Multipliers
+from go2_wbc.wbc.contact_prices import are_hasty
 from go2_wbc.wbc.contradiction import Contradiction
 from go2_wbc.wbc.limit_rows import (
     JOINT_WORDS,
@@ -63,9 +64,6 @@ from go2_wbc.wbc.tasks import (
 )
 
 ALIKE = 0.5  #: Share of the greatest cost from which on one counts as about as great; own choice
-HASTY = 10.0
-"""Acceleration [m/s^2] that stops a foot from which on its contact is a limit, as it is of a foot
-that slides at 0.5 m/s with the usual ``stance_damping``."""
 _TRACE = 1e-6  # weight of a contact that is lifted
 _TINY = 1e-9  # a multiplier below this share of the greatest is rounding
 
@@ -208,12 +206,19 @@ def _ranked(found: list[tuple[BindingLimit, float]]) -> list[tuple[BindingLimit,
 def multipliers_of(problem: Problem, *, is_relaxed: bool = False) -> Multipliers:
     """The multiplier of every limit; of the relaxed problem where limits gave way.
 
+    Contacts have none there, as a task takes their place.
+
     Raises:
         QpInfeasible: if there is no solution.
     """
     found = Multipliers()
-    y = solve_with_multipliers(relaxed_qp(problem))[1] if is_relaxed else _Solved.of(problem).y
-    found.row[places_of(problem)] = y
+    places = places_of(problem)
+    if is_relaxed:
+        found.row[places] = solve_with_multipliers(relaxed_qp(problem))[1]
+        return found
+    solved = _Solved.of(problem)
+    found.row[places] = solved.y
+    found.contacts[problem.stance] = solved.contacts
     return found
 
 
@@ -246,6 +251,15 @@ class _Solved:
     def cost(self) -> float:
         return float(self.problem.weights @ self.residuals**2) / 2
 
+    @property
+    def contacts(self) -> Float[np.ndarray, " feet"]:
+        """The multiplier of what each contact asks for, by (1) with the equalities' E'l."""
+        qp, e = self.qp, self.problem.equalities.b[6:].reshape(-1, 3)
+        slope = qp.H @ self.x + qp.g + qp.C.T @ self.y
+        prices = np.linalg.lstsq(qp.equalities[0].T, -slope, rcond=None)[0][6:].reshape(-1, 3)
+        along = (prices * e).sum(axis=1) / np.maximum(np.linalg.norm(e, axis=1), _TINY)
+        return np.where(are_hasty(self.problem), along, 0.0)
+
     def active(self) -> Int[np.ndarray, " k"]:
         """The rows that bind."""
         return np.flatnonzero(np.abs(self.y) > _TINY * max(1.0, np.abs(self.y).max(initial=0.0)))
@@ -254,11 +268,10 @@ class _Solved:
 def _binding(solved: _Solved) -> Iterator[tuple[BindingLimit, float]]:
     """What binds, and how unusual it is."""
     problem, active = solved.problem, solved.active()
-    if not len(active):
-        return
-    feet = range(int(problem.stance.sum()))
+    feet = np.flatnonzero(are_hasty(problem)).tolist()
     contacts = [(k, contact_of(problem, k, solved.z)) for k in feet]
-    contacts = [(k, limit) for k, limit in contacts if limit.limit > HASTY]
+    if not (len(active) or contacts):
+        return
     e = solved.qp.equalities[1]
     moves = np.zeros((len(active) + len(e), len(active) + len(contacts)))
     sides = np.sign(solved.y[active])

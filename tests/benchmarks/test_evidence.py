@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import balance, locomotion, speed
+from benchmarks import balance, locomotion, policies, speed
 from benchmarks.__main__ import main
 from benchmarks.behaviour import STUDIES
 from benchmarks.evidence import END, MARK, SPEEDS, Line, Table, filled, names_of, rows_of, tables
@@ -31,6 +31,7 @@ ROWS = {name: {"n": 20, "mean": 0.5, "worst": 0.25} for name in TRUTH.metrics}
         (SPEED, speed.STUDIES),
         (SENSED, (*locomotion.STUDIES, *balance.STUDIES)),
         (BOTH, (*locomotion.STUDIES, *balance.STUDIES)),
+        (tables()["policies"], policies.STUDIES),
     ],
 )
 def test_every_line_is_a_metric_of_the_benchmark(table: Table, studies: tuple[Study, ...]) -> None:

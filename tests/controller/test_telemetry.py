@@ -162,7 +162,7 @@ def test_multipliers_are_kept_of_the_ticks_in_which_they_were_wanted(model: Robo
         telemetry.note(solved(float(tick)) if tick != 8 else None)
     recording = telemetry.samples(rate=1 / PERIOD).recording()
     wanted = [*[np.nan] * 4, *range(4, 8), np.nan, *range(9, 12)]
-    np.testing.assert_array_equal(recording.multipliers, np.tile(wanted, (44, 1)).T)
+    np.testing.assert_array_equal(recording.multipliers, np.tile(wanted, (48, 1)).T)
     assert not recording.gave_way.any()
 
 

@@ -27,7 +27,7 @@ def recording() -> Recording:
         robot="a1",
         model_file="my_a1.xml",
         ground=rng.normal(size=(7, 3)),
-        multipliers=rng.normal(size=(5, 44)),
+        multipliers=rng.normal(size=(5, 48)),
         gave_way=rng.random(5) < 0.5,
     )
 
@@ -60,7 +60,7 @@ def test_labels_become_spans_a_part_may_be_empty_and_all_is_a_table_for_pandas(
     table = pytest.importorskip("pandas") and recording.to_dataframe()
     assert list(table.columns[:3]) == ["time", "label", "q0"]
     assert table["stance3"].tolist() == recording.stance[:, 3].tolist()
-    assert table.shape == (5, 2 + 19 + 18 + 12 + 4 + 4 + 3 + 1 + 44 + 1)
+    assert table.shape == (5, 2 + 19 + 18 + 12 + 4 + 4 + 3 + 1 + 48 + 1)
     torque = table["multiplier: FR_calf torque"]
     assert torque.tolist() == recording.multipliers[:, 25].tolist()
 
@@ -83,19 +83,21 @@ def test_a_file_that_is_no_recording_is_told_so(content: bytes | None, tmp_path:
 
 
 def test_what_binds_is_told_by_name_and_time(recording: Recording) -> None:
-    y = np.zeros((5, 44))
+    y = np.zeros((5, 48))
     y[0] = np.nan  # no whole-body QP
     y[1:3, LIMIT_ROWS.index("FR friction -y")] = 0.1
     y[2, LIMIT_ROWS.index("RL normal force")] = -0.2
     y[4, LIMIT_ROWS.index("RL normal force")] = 0.2
     y[3, LIMIT_ROWS.index("FL_calf torque")] = -0.3
     y[3, LIMIT_ROWS.index("RR_thigh acceleration")] = 0.3
+    y[3:, LIMIT_ROWS.index("FL contact")] = -0.1
     told = replace(recording, multipliers=y, gave_way=np.arange(5) == 4).binding()
     assert [(span.label, round(span.start, 3), round(span.end, 3)) for span in told] == [
         ("friction of FR", 0.1, 0.3),
         ("least normal force of RL", 0.2, 0.3),
         ("torque limit of FL_calf", 0.3, 0.4),
         ("end or speed of RR_thigh", 0.3, 0.4),
+        ("contact of FL", 0.3, 0.4),
         ("greatest normal force of RL", 0.4, 0.4),
         ("limits contradict each other", 0.4, 0.4),
     ]
@@ -104,7 +106,7 @@ def test_what_binds_is_told_by_name_and_time(recording: Recording) -> None:
 def test_one_that_was_not_explained_says_so_and_loads_as_before(
     recording: Recording, tmp_path: Path
 ) -> None:
-    silent = replace(recording, multipliers=np.empty((0, 44)), gave_way=np.empty(0, bool))
+    silent = replace(recording, multipliers=np.empty((0, 48)), gave_way=np.empty(0, bool))
     assert recording.is_explained
     assert not silent.is_explained
     assert silent.binding() == ()

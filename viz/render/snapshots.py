@@ -29,10 +29,10 @@ _CREASE = np.deg2rad(30.0)
 class SnapshotCamera:
     """Takes pictures from aside, at a fixed distance from the robot."""
 
-    def __init__(self, robot: str = GO2, style: ShotStyle = STYLE) -> None:
-        """Load the robot's meshes."""
+    def __init__(self, robot: str = GO2, style: ShotStyle = STYLE, model_file: str = "") -> None:
+        """Load the robot's meshes, of its own ``model_file`` if it has one."""
         self._style = style
-        self._robot = PosedRobot(load_robot_visuals(robot).simplified(style.detail))
+        self._robot = PosedRobot(load_robot_visuals(robot, model_file).simplified(style.detail))
 
     def shoot(
         self, q: Float[np.ndarray, "19"], blocks: Sequence[Block] = ()

@@ -153,7 +153,7 @@ class MujocoPlant(Plant):
             self.joint_damping = tuple(self._model.dof_damping[self._layout.joint_v].tolist())
         self._noise = (noise or SensorNoise()) if sensors == "noisy" else None
         self._period, self._substeps = control_period, round(control_period / timestep)
-        self._closed, self._ticks = False, 0
+        self._closed, self._ticks, self._is_users = False, 0, mjcf is not None
         self._commands = DelayedCommands(self._substeps, round(delay / timestep))
         self._faults = Faults(self._description)
         self._pushes = Pushes(self._model, self._data, self._layout)
@@ -467,7 +467,7 @@ class MujocoPlant(Plant):
 
     @cached_property
     def _variation(self) -> Variation:
-        return Variation(self._model, self._layout.joint_v)
+        return Variation(self._model, self._layout, is_users=self._is_users)
 
     def _check_open(self) -> None:
         if self._closed:

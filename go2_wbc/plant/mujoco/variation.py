@@ -8,9 +8,11 @@ from typing import final
 
 import mujoco
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from go2_wbc.errors import ConfigError
+from go2_wbc.legs import LEGS
+from go2_wbc.plant.mujoco.forces import MujocoLayout
 from go2_wbc.plant.mujoco.model import PAYLOAD_BODY
 from go2_wbc.world import World
 
@@ -52,10 +54,15 @@ class DelayedCommands:
 class Variation:
     """Puts a compiled model into another world, without building it anew."""
 
-    def __init__(self, model: mujoco.MjModel, joints: Int[np.ndarray, "12"]) -> None:
-        """Note how it was built; ``joints`` are the entries of ``qvel`` that the joints have."""
-        self._model, self._scratch, self._joints = model, mujoco.MjData(model), joints
+    def __init__(self, model: mujoco.MjModel, layout: MujocoLayout, *, is_users: bool) -> None:
+        """Note how it was built; of a user's own MJCF friction is that of the feet's contacts."""
+        self._model, self._scratch = model, mujoco.MjData(model)
+        self._joints = joints = layout.joint_v
         self._slides = model.geom_priority == 0  # the others have a friction of their own
+        self._priority = 0
+        if is_users:
+            self._slides = np.isin(layout.geom_codes, np.array(LEGS, int))
+            self._priority = int(model.geom_priority[~self._slides].max(initial=0)) + 1
         names = [model.body(number).name for number in range(model.nbody)]
         self._own = np.array([name != PAYLOAD_BODY for name in names])
         self._payload = float(model.body_mass[~self._own].sum())
@@ -75,6 +82,7 @@ class Variation:
             raise ConfigError(f"payload cannot become {world.payload:g} kg, the plant {told}")
         model, (damping, loss) = self._model, self._friction
         model.geom_friction[self._slides, 0] = world.friction
+        model.geom_priority[self._slides] = self._priority
         model.body_mass[self._own] = self._mass * world.mass_scale
         model.body_inertia[self._own] = self._inertia * world.mass_scale
         model.dof_damping[self._joints] = world.joint_friction * damping

@@ -14,10 +14,11 @@ pytest.importorskip("gymnasium", reason='needs pip install "go2-wbc[learning]"')
 import gymnasium
 from gymnasium.utils.env_checker import check_env
 
+from benchmarks.robots import menagerie_go2
 from controller.learning import ENVIRONMENTS, TASKS, Go2Env, LearningTask
 from controller.learning.tasks import WEIGHTS
 from controller.observation import OBSERVATION, RATE, STANCE, TARGETS, TORQUES
-from go2_wbc.errors import CommandError
+from go2_wbc.errors import CommandError, ModelMismatch
 from go2_wbc.robot.state import JointCommand
 
 SETTLED = 0.03
@@ -44,6 +45,21 @@ def stood(environment: Go2Env, steps: int) -> Any:  # noqa: ANN401
             break
         step = environment.step(STAND)
     return step
+
+
+def test_another_authors_file_is_an_environment_like_any_other() -> None:
+    file = menagerie_go2()
+    check_env(gymnasium.make("Go2-v0", mjcf=file).unwrapped)
+    environment, built = Go2Env("push", mjcf=file), Go2Env("push")
+    first, again = (run(environment, seed=2) for _ in range(2))
+    for own, other in zip(first, again, strict=True):
+        assert np.array_equal(own[0], other[0])
+    assert environment.plant.total_mass < built.plant.total_mass - 0.1
+    assert not np.allclose(first[-1][0], run(built, seed=2)[-1][0])
+    with pytest.raises(CommandError, match="'rough' has terrains, an mjcf brings its own ground"):
+        Go2Env("rough", mjcf=file)
+    with pytest.raises(ModelMismatch, match="no such file"):
+        Go2Env(mjcf="nowhere.xml")
 
 
 @pytest.mark.parametrize("kind", [TARGETS, TORQUES])

@@ -73,6 +73,23 @@ def test_wrong_numbers_are_named_and_so_is_a_worker_that_dies() -> None:
     with pytest.raises(SweepError, match="finite"):
         together.step(np.stack([np.full(12, np.nan), np.zeros(12)]).astype(np.float32))
     os.kill(together._workers[0]._process.pid or 0, signal.SIGKILL)
-    with pytest.raises(SweepError, match="died"):
-        together.step(np.zeros((2, 12), dtype=np.float32))
+    for _ in range(2):
+        with pytest.raises(SweepError, match=r"environments \[0\] has died \(killed by SIGKILL\)"):
+            together.step(np.zeros((2, 12), dtype=np.float32))
+    together.close()
+    with pytest.raises(SweepError, match="closed"):
+        together.reset(seed=0)
+
+
+def test_after_an_action_that_is_refused_nobody_is_told_of_the_step_before() -> None:
+    """Of the calling process's own share it was: the workers' answers waited for the next step."""
+    together, alone = Go2VectorEnv(2, workers=2), Go2Env()
+    together.reset(seed=0)
+    with pytest.raises(CommandError, match="finite"):
+        together.step(np.stack([np.zeros(12), np.full(12, np.nan)]).astype(np.float32))
+    seen, _ = together.reset(seed=3)
+    assert np.array_equal(seen[0], alone.reset(seed=3)[0])
+    for actions in ACTIONS:
+        seen, *_ = together.step(actions[:2])
+        assert np.array_equal(seen[0], alone.step(actions[0])[0])
     together.close()

@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from benchmarks.robots import menagerie_go2
 from go2_wbc import World
 from go2_wbc.errors import ConfigError
 from go2_wbc.plant import MujocoPlant, plant_in_world
@@ -105,6 +106,20 @@ def test_a_plant_put_into_another_world_is_the_one_that_is_built_there() -> None
     assert varied.read().q == pytest.approx(built.read().q, abs=1e-12)
     with pytest.raises(ConfigError, match="payload"):
         varied.vary(World(payload=1.0))
+
+
+def test_another_authors_file_is_put_into_another_world_by_the_friction_of_its_feet() -> None:
+    # Its feet have a priority of their own: the friction of all that has none did not matter.
+    file, world = menagerie_go2(), World(friction=0.3, mass_scale=0.95)
+    varied, built = MujocoPlant(file), MujocoPlant(file, friction=0.3, mass_scale=0.95)
+    varied.vary(world)
+    q = built.read().q
+    for plant in (varied, built):
+        plant.place(q, np.array([1.0, 0.5, *np.zeros(16)]))
+        for _ in range(50):
+            plant.write(JointCommand.servo(np.tile([0.0, 0.8, -1.6], 4), np.zeros(12), 30.0, 1.0))
+    assert varied.read().q == pytest.approx(built.read().q, abs=1e-12)
+    assert np.linalg.norm(varied.read().q[:2] - q[:2]) > 0.05
 
 
 def test_a_save_brings_back_the_delay_that_it_had() -> None:

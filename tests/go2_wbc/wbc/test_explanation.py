@@ -12,7 +12,7 @@ import pytest
 from controller import GO2Controller
 from go2_wbc.brief import LONGEST
 from go2_wbc.errors import QpInfeasible
-from go2_wbc.legs import Leg
+from go2_wbc.legs import LEGS, Leg
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.records import packed
 from go2_wbc.reference import Reference
@@ -21,8 +21,9 @@ from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.backends import dense_qp, eliminate_equalities, solve_condensed
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.constraints import JointLimits
+from go2_wbc.wbc.contact_prices import HASTY
 from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
-from go2_wbc.wbc.explanation import HASTY, BindingLimit, Explanation, _ranked, task_labels
+from go2_wbc.wbc.explanation import BindingLimit, Explanation, _ranked, task_labels
 from go2_wbc.wbc.limit_rows import places_of
 from go2_wbc.wbc.problem import SIZE, Problem, Rows
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
@@ -318,6 +319,48 @@ def test_a_foot_that_shall_stand_though_it_flies_is_a_limit() -> None:
         assert contact.limit > HASTY
         assert 0.0 < contact.cost <= why.cost
     assert sum(why.first in one.causes for one, why in feasible) >= len(feasible) - 1
+
+
+def contact_slope(problem: Problem, foot: int) -> float | None:
+    """By how much the least cost falls for 1 m/s^2 less, by another solver; None across a kink."""
+    E, e = problem.equalities.A, problem.equalities.b
+    rows, step = slice(6 + 3 * foot, 9 + 3 * foot), 0.1
+    costs, bound = list[float](), set[frozenset[int]]()
+    Z = np.linalg.svd(E)[2][len(E) :].T
+    for side in (1.0, -1.0):
+        less = e.copy()
+        less[rows] -= side * step * e[rows] / np.linalg.norm(e[rows])
+        z0 = np.linalg.lstsq(E, less, rcond=None)[0]
+        qp = dense_qp(problem, Z, z0)
+        u = solve_dense_qp(qp, "quadprog")
+        bound.add(binding_rows(qp, u))
+        costs.append(cost(problem, Z @ u + z0))
+    return (costs[1] - costs[0]) / (2 * step) if len(bound) == 1 else None
+
+
+def test_what_a_contact_costs_is_the_slope_of_the_optimal_cost_in_the_record_too() -> None:
+    """With a task of a user's own, too."""
+    own = WholeBodyController(MODEL, extra_tasks=(Still(),))
+    checked = 0
+    for situation in situations(contact_in_the_air, 8, seed=50):
+        for wbc in (PLAIN, own):
+            snapshot, reference = situation.snapshot, situation.reference
+            try:
+                solution = wbc.solve(snapshot, reference)
+            except QpInfeasible:
+                continue
+            problem, recorded = wbc.formulate(snapshot, reference), solution.multipliers.contacts
+            told = {limit.name: limit for limit in solution.explain().binding}
+            for foot in range(4):
+                limit = told.get(f"contact of {LEGS[foot].name}")
+                assert (recorded[foot] != 0.0) == (limit is not None)
+                if limit is not None:
+                    side = 1.0 if limit.side == "upper" else -1.0
+                    np.testing.assert_allclose(recorded[foot], side * limit.multiplier, rtol=1e-6)
+                    if (slope := contact_slope(problem, foot)) is not None:
+                        np.testing.assert_allclose(-recorded[foot], slope, rtol=DIFFERENCES)
+                        checked += 1
+    assert checked >= 8
 
 
 def test_of_limits_that_cost_about_as_much_the_most_unusual_comes_first() -> None:

@@ -184,7 +184,7 @@ def test_the_ground_that_was_seen_is_drawn_by_its_height(
 def test_what_is_in_the_way_is_told_and_drawn_in_its_legs_lane(
     recording: Recording, open_page: OpenPage
 ) -> None:
-    y = np.zeros((len(recording.time), 44))
+    y = np.zeros((len(recording.time), 48))
     y[50:80, LIMIT_ROWS.index("RL_calf torque")] = 1.0
     y[60:80, LIMIT_ROWS.index("RL friction +x")] = 1.0
     gave_way = np.zeros(len(y), dtype=bool)

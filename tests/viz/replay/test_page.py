@@ -66,7 +66,7 @@ def test_the_ground_that_was_seen_is_in_the_page(recording: Recording, tmp_path:
 def test_what_bound_is_in_the_page_without_its_short_breaks(
     recording: Recording, tmp_path: Path
 ) -> None:
-    y, n = np.zeros((len(recording.time), 44)), len(recording.time)
+    y, n = np.zeros((len(recording.time), 48)), len(recording.time)
     y[[10, 12, 13, 60], LIMIT_ROWS.index("FL_calf torque")] = 1.0
     explained = replace(recording, multipliers=y, gave_way=np.arange(n) == 100)
     page = viz.export_html(explained, tmp_path / "a.html", title="a").read_text(encoding="utf-8")

@@ -1,7 +1,7 @@
 "use strict";
 // What was in the way: a lane for each leg, in it the limits of the whole-body QP that bound.
 
-const KINDS = { torque: "#a855f7", friction: "#f59e0b", force: "#0ea5e9", joint: "#10b981" };
+const KINDS = { torque: "#a855f7", friction: "#f59e0b", force: "#0ea5e9", joint: "#10b981", contact: "#ec4899" };
 
 // "torque limit of FL_calf" is of a kind and of a leg.
 function kindOf(name) {
