@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from controller.studio.source import Site, Source, first_parameters
+from controller.studio.source import Site, Source, first_parameters, parameters
 from go2_wbc.errors import StudioError, unknown_name
 
 
@@ -17,6 +17,7 @@ class Template:
     title: str  #: on the page
     call: str  #: name of the method
     arguments: Mapping[str, float | str]  #: what it is called with at first
+    is_put_down: bool = False  #: whether the foot of it is put down after
 
     def code(self, source: Source) -> str:
         """It as text of this file."""
@@ -25,7 +26,10 @@ class Template:
             source.value(name, value) if name in first else source.argument(name, value)
             for name, value in given
         ]
-        return f".{self.call}({', '.join(texts)})"
+        end = ""
+        if self.is_put_down:
+            end = Template("", "down", {"leg": self.arguments["leg"], "over": 0.5}).code(source)
+        return f".{self.call}({', '.join(texts)}){end}"
 
 
 PALETTE: Mapping[str, Template] = MappingProxyType(
@@ -39,6 +43,9 @@ PALETTE: Mapping[str, Template] = MappingProxyType(
             Template("Look at a place", "look_at", {"x": 1.0, "y": 0.3, "z": 0.4, "over": 0.6}),
             Template("Pause", "hold", {"seconds": 0.5}),
             Template("Raise a foot", "foot", {"leg": "FR", "z": 0.08, "over": 0.5}),
+            Template(
+                "Lift and put down", "foot", {"leg": "FR", "z": 0.08, "over": 0.5}, is_put_down=True
+            ),
             Template("Put a foot down", "down", {"leg": "FR", "over": 0.5}),
             Template("All home", "home", {"over": 0.8}),
             Template("Step with a foot", "step", {"leg": "FR", "x": 0.05, "over": 0.5}),
@@ -57,7 +64,8 @@ def edited(source: Source, order: Mapping[str, object]) -> Source:
     Args:
         source: the text that is saved.
         order: ``op``, ``site`` of the call, and what the edit needs: ``name``, ``value`` and the
-            ``number`` of the run, ``title`` of a template, or ``step``.
+            ``number`` of the run, ``title`` of a template and the ``values`` of its arguments that
+            differ, or ``step``.
 
     Raises:
         StudioError: for an order that is not one, or an edit that cannot be made.
@@ -84,7 +92,13 @@ def _insert(source: Source, site: Site, order: Mapping[str, object]) -> Source:
     title = order.get("title")
     if not isinstance(title, str) or title not in PALETTE:
         raise StudioError(unknown_name("move", str(title), PALETTE))
-    return source.insert(site, PALETTE[title].code(source))
+    values, template = order.get("values") or {}, PALETTE[title]
+    if not isinstance(values, dict) or not set(values) <= set(parameters(template.call)):
+        raise StudioError(f"{template.call}() takes {', '.join(parameters(template.call))}")
+    if not all(type(value) in (int, float, str) for value in values.values()):
+        raise StudioError("an argument needs a number or a word")
+    arguments = {**template.arguments, **values}
+    return source.insert(site, replace(template, arguments=arguments).code(source))
 
 
 def _swap(source: Source, site: Site, order: Mapping[str, object]) -> Source:

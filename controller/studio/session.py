@@ -11,11 +11,13 @@ from pathlib import Path
 from typing import final
 
 import viz
-from controller.studio.edits import PALETTE, edited
+from controller.studio.edits import PALETTE
 from controller.studio.orders import Answer, Bar, Order, Task
 from controller.studio.project import Project
 from controller.studio.running import Runner
+from controller.studio.songs import heard, songs_beside
 from controller.studio.source import Source, parameters
+from controller.studio.together import copied, edited_together, pasted
 from go2_wbc.curves import Ease
 from go2_wbc.errors import Go2WbcError, StudioError, unknown_name
 from go2_wbc.legs import LEGS
@@ -64,6 +66,8 @@ class Studio:
         self._lock, self.motion = threading.RLock(), motion
         self._runner, self._player = Runner(), Runner()
         self._changes: tuple[str, ...] = ()
+        self._copied: tuple[str, ...] = ()
+        self._motions: tuple[str, ...] = ()
         try:
             shown = self._run(self._project.saved)
             self.motion = shown.title
@@ -76,6 +80,9 @@ class Studio:
                 token=token,
                 actions={
                     "/edit": self.edit,
+                    "/copy": self.copy,
+                    "/choose": self.choose,
+                    "/music": self.music,
                     "/play": self.play,
                     "/mend": self.mend,
                     "/export": self.export,
@@ -90,8 +97,9 @@ class Studio:
         """Do what a page asks for.
 
         Args:
-            order: see ``edited``; besides ``op`` "undo" and "redo". ``base`` is the state of the
-                file that the page knows, ``commit`` whether to save.
+            order: see ``edited_together``; besides ``op`` "undo" and "redo", "change" (see
+                ``mend``), and "paste" behind ``site`` what ``copy`` has taken. ``base`` is the
+                state of the file that the page knows, ``commit`` whether to save.
 
         Returns:
             What the page shows next, packed, and of what was saved the ``site`` of the call that
@@ -123,12 +131,49 @@ class Studio:
 
     def _edited(self, order: Mapping[str, object]) -> Source:
         source = Source(self._project.saved)
+        if order.get("op") == "paste":
+            return pasted(source, order, self._copied)
         if order.get("op") != "change":
-            return edited(source, order)
+            return edited_together(source, order)
         which = order.get("which")
         if type(which) is not int or not 0 <= which < len(self._changes):
             raise StudioError("a change is one of those that were proposed")
         return source.append(self.motion or "", self._changes[which])
+
+    def copy(self, order: Mapping[str, object]) -> dict[str, object]:
+        """Keep the calls that end in ``sites``, to be pasted into any motion of the file."""
+        with self._lock:
+            try:
+                self._copied = copied(Source(self._project.saved), order)
+            except StudioError as error:
+                return {"error": str(error)}
+        count = len(self._copied)
+        return {"told": f"copied {count} {'moves' if count > 1 else 'move'}"}
+
+    def choose(self, order: Mapping[str, object]) -> dict[str, object]:
+        """Show another motion of the file: ``motion`` is its name."""
+        with self._lock:
+            before, name = self.motion, order.get("motion")
+            if not isinstance(name, str) or name not in self._motions:
+                return {"error": unknown_name("motion", str(name), self._motions)}
+            self.motion, self._values = name, {}
+            try:
+                self._server.publish(self._content(self._run(self._project.saved)), name)
+            except StudioError as error:
+                self.motion = before
+                return {"error": str(error)}
+        return {}
+
+    def music(self, order: Mapping[str, object]) -> dict[str, object]:
+        """The beats and the sound of ``name``, one of the sound files beside the motion's."""
+        path, name = self._project.path, order.get("name")
+        songs = songs_beside(path)
+        if not isinstance(name, str) or name not in songs:
+            return {"error": unknown_name("song", str(name), songs)}
+        try:
+            return heard(path.with_name(name))
+        except Go2WbcError as error:
+            return {"error": str(error)}
 
     def play(self, _: Mapping[str, object]) -> dict[str, object]:
         """The motion as it is saved, in MuJoCo beside the plan; or why it could not be played."""
@@ -217,13 +262,17 @@ class Studio:
         editor = {
             "bars": bars,
             "file": self._project.path.name,
+            "motion": shown.title,
+            "motions": shown.motions,
             "base": self._base,
             "undo": self._project.can_undo,
             "redo": self._project.can_redo,
             "palette": list(PALETTE),
+            "songs": songs_beside(self._project.path),
             "words": WORDS,
             "lanes": ["trunk", *(leg.name for leg in LEGS), "robot", "time"],
         }
+        self._motions = shown.motions
         if shown.content is None:
             raise StudioError("there is nothing to show")
         return replace(shown.content, editor=editor)

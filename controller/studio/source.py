@@ -122,6 +122,10 @@ class Source:
         layout = re.match(r"\s*", self._text(self._link(call)))
         return self._behind(call, (layout[0] if layout else "") + code)
 
+    def text(self, site: Site) -> str:
+        """A call as it is written, such as ``.hold(0.5)``."""
+        return self._text(self._link(self._call(site))).strip()
+
     def _behind(self, call: ast.Call, text: str) -> Source:
         """With ``text`` behind a call; as a statement of its own where the line would be long."""
         (_, end), statement = self._link(call), self._statement(call)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import replace
+from enum import Enum
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING
 
 from controller.studio.orders import Answer, Bar, Order, Task
 from controller.studio.source import Source
 from go2_wbc.errors import Go2WbcError, StudioError
-from go2_wbc.legs import LEGS
+from go2_wbc.legs import LEGS, Leg
 
 if TYPE_CHECKING:
     from motions import CheckedMotion, FeasibilityChecker
@@ -65,7 +66,7 @@ def _answer(order: Order, checker: FeasibilityChecker, pipe: Connection) -> Answ
         return StudioError(str(error) if is_ours else "the file ends the program")
     sliders = tuple(slider(item, values.get(item.name, item.default)) for item in motion.parameters)
     bars = tuple(_bars(Source(order.data), str(order.path), marks, content))
-    return Answer(motion.name, replace(content, sliders=sliders), bars, told)
+    return Answer(motion.name, replace(content, sliders=sliders), bars, tuple(own), told)
 
 
 def _played(checked: CheckedMotion, checker: FeasibilityChecker) -> tuple[ReplayContent, str]:
@@ -108,7 +109,19 @@ def _bars(
             parts,
             _broken(content, mark.start, mark.end, parts),
             tuple(source.slots(call.site, call.number)) if is_here else (),
+            dict(_values(call.arguments)),
         )
+
+
+def _values(arguments: Mapping[str, object]) -> Iterator[tuple[str, float | str]]:
+    """Those that are numbers or words."""
+    for name, value in arguments.items():
+        if isinstance(value, Leg):
+            yield name, value.name
+        elif isinstance(value, Enum):
+            yield name, str(value.value)
+        elif isinstance(value, int | float | str) and not isinstance(value, bool):
+            yield name, value
 
 
 def _broken(content: ReplayContent, start: float, end: float, parts: Sequence[str]) -> str:

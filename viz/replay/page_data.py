@@ -120,7 +120,8 @@ def robot_scene(visuals: RobotVisuals, pack: Pack) -> dict[str, object]:
 
     Returns:
         Header entries: ``meshes`` (count), ``commands``, ``base`` (path of the moving trunk) and
-        ``joints`` (path and axis of each joint, in the order of q).
+        ``joints`` (path, axis and limits [rad] of each joint, in
+        the order of q).
     """
     commands: list[object] = []
     window = SimpleNamespace(send=lambda command: commands.append(command.lower()))
@@ -133,7 +134,10 @@ def robot_scene(visuals: RobotVisuals, pack: Pack) -> dict[str, object]:
         fixed.set_transform(model.jointPlacements[joint].homogeneous)
         # The lower half of a revolute joint's motion subspace is its axis, in its own frame.
         axis = np.ravel(model.joints[joint].createData().S)[3:].tolist()
-        joints.append({"path": paths[joint], "axis": axis})
+        row = model.joints[joint].idx_q
+        limits = model.lowerPositionLimit[row], model.upperPositionLimit[row]
+        low, high = (float(limit) for limit in limits)
+        joints.append({"path": paths[joint], "axis": axis, "low": low, "high": high})
     used: Counter[str] = Counter()
     for item in visuals.geometry.geometryObjects:
         link = "base" if item.parentJoint == 1 else model.frames[item.parentFrame].name
@@ -402,7 +406,9 @@ def reduced(curve: MarginCurve) -> MarginCurve:
 HTML_SUFFIXES = (".html", ".htm")
 PAGE_LIMIT = 4_000_000  #: Largest page [bytes]
 _SCRIPTS = "data stage scene ghost steps flags charts binding trust verdict sound app"
-"""Of the assets, in the order in which they need one another; a live page has another one."""
+_EDITOR = "words view tracks inspector hands music tools tour page"
+"""Of the assets, in the order in which they need one another; a live page has another one, and one
+that edits those of the studio."""
 
 
 @typed()
@@ -442,7 +448,8 @@ def page_text(
     A live one listens to its server; an editor has bars besides, and needs ``content.editor``.
     """
     names = [f"replay_{name}" for name in _SCRIPTS.split()]
-    names += ["replay_live"] * is_live + ["studio_tracks", "studio_inspector", "studio"] * is_editor
+    names += ["replay_live"] * is_live
+    names += [f"studio_{name}" for name in _EDITOR.split()] * is_editor
     bundle = Path(meshcat.viewer_assets_path()) / "dist" / "main.min.js"
     parts = {
         "TITLE": html.escape(title),

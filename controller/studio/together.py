@@ -1,0 +1,83 @@
+"""Edits of several calls, or several arguments, that are one step of the history."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from controller.studio.edits import edited
+from controller.studio.source import Site, Source
+from go2_wbc.errors import StudioError
+
+MOST = 1000  #: Calls that one order may concern
+
+
+def copied(source: Source, order: Mapping[str, object]) -> tuple[str, ...]:
+    """The texts of the calls that end in ``sites``, in the order of the file."""
+    return tuple(source.text(site) for site in sorted(_sites(order)))
+
+
+def pasted(source: Source, order: Mapping[str, object], texts: Sequence[str]) -> Source:
+    """With copies of calls behind the one that ends in ``site``.
+
+    Raises:
+        StudioError: if nothing was copied, or no call ends there.
+    """
+    if not texts:
+        raise StudioError("nothing was copied")
+    (site,) = _sites({"sites": [order.get("site")]})
+    for text in texts:
+        source = source.insert(site, text)
+        site = source.site or site
+    return source
+
+
+def edited_together(source: Source, order: Mapping[str, object]) -> Source:
+    """The text after one edit, or several.
+
+    Args:
+        source: the text that is saved.
+        order: as ``edited`` takes it; or with ``op`` "set_many" and ``values``, several arguments
+            of one call; "many" and ``orders``, each with its own site in the saved text; "copies"
+            and ``sites``, copies of these calls behind ``site``.
+
+    Raises:
+        StudioError: if one of them cannot be made; none is then.
+    """
+    op = order.get("op")
+    if op == "copies":
+        return pasted(source, order, copied(source, order))
+    if op == "set_many":
+        return _set_many(source, order)
+    if op != "many":
+        return edited(source, order)
+    orders = order.get("orders")
+    if not (isinstance(orders, list) and all(isinstance(one, dict) for one in orders)):
+        raise StudioError("several edits need a list of them")
+    # From the end, so that the places before stay; what moves ahead makes way from the front.
+    is_ahead = any(one.get("step") == -1 for one in orders)
+    sites = _sites({"sites": [one.get("site") for one in orders]})
+    for _, one in sorted(zip(sites, orders, strict=True), key=lambda p: p[0], reverse=not is_ahead):
+        source = edited_together(source, one)
+    return source
+
+
+def _set_many(source: Source, order: Mapping[str, object]) -> Source:
+    values = order.get("values")
+    if not (isinstance(values, dict) and values):
+        raise StudioError("several arguments need their values by their names")
+    for name, value in values.items():
+        one = {**order, "op": "set", "name": name, "value": value}
+        source = edited(source, one)
+        order = {**order, "site": list(source.site or ())}
+    return source
+
+
+def _sites(order: Mapping[str, object]) -> list[Site]:
+    given = order.get("sites")
+    if not (isinstance(given, list) and 0 < len(given) <= MOST and all(map(_is_site, given))):
+        raise StudioError(f"an edit needs the places of calls, got {given!r:.80}")
+    return [(site[0], site[1]) for site in given]
+
+
+def _is_site(given: object) -> bool:
+    return isinstance(given, list) and len(given) == 2 and all(type(n) is int for n in given)
