@@ -68,8 +68,9 @@ class Tracks {
     return row;
   }
 
-  get width() {
-    return Math.max(this.box.clientWidth - LANE_LEFT - LANE_RIGHT, 1);
+  // Asked for once a drawing: each answer would lay the page out again.
+  measure() {
+    this.width = Math.max(this.box.clientWidth - LANE_LEFT - LANE_RIGHT, 1);
   }
 
   xAt(t) {
@@ -78,6 +79,7 @@ class Tracks {
 
   draw() {
     if (!this.data) return;
+    this.measure();
     const { width } = this;
     const seen = new Set();
     for (const item of this.items) {
