@@ -40,7 +40,9 @@ class Inspector {
   }
 
   focus() {
-    this.box.querySelector("input, select")?.focus();
+    const field = this.box.querySelector("input, select");
+    field?.focus();
+    field?.select?.();
   }
 
   // The next call is shown anew, whatever is typed into.

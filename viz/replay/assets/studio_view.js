@@ -101,7 +101,10 @@ class TimeView {
       const [a, b] = [...fingers.values()];
       return [Math.max(Math.abs(a - b), 20), timeAt((a + b) / 2)];
     };
-    const gone = (event) => fingers.delete(event.pointerId);
+    const gone = (event) => {
+      fingers.delete(event.pointerId);
+      this.pinched = null;
+    };
     box.addEventListener("pointerdown", (event) => {
       if (event.pointerType !== "touch") return;
       fingers.set(event.pointerId, event.clientX);
@@ -109,7 +112,11 @@ class TimeView {
     }, true);
     window.addEventListener("pointermove", (event) => {
       if (!fingers.has(event.pointerId)) return;
+      const passed = event.clientX - fingers.get(event.pointerId);
       fingers.set(event.pointerId, event.clientX);
+      if (fingers.size === 1 && event.target.closest(".lane") && !event.target.closest(".bar, #music")) {
+        this.pan(-passed / box.clientWidth * this.length); // one finger beside the bars
+      }
       if (fingers.size !== 2) return;
       const [now, middle] = spread();
       const [before, held] = this.pinched;
