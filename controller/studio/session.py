@@ -127,7 +127,7 @@ class Studio:
             self._project.save(data)
             self._server.publish(self._content(shown))
             return site
-        return {"data": content_text(self._content(shown), shown.title, is_draft=True)}
+        return {"data": content_text(self._content(shown), shown.title)}
 
     def _edited(self, order: Mapping[str, object]) -> Source:
         source = Source(self._project.saved)

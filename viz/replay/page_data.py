@@ -79,22 +79,19 @@ class Pack:
         scale = span / _QUANTISED_LEVELS
         self.add(name, levels, {"low": low.tolist(), "scale": scale.tolist()})
 
-    def packed(self, header: dict[str, object], *, is_draft: bool = False) -> str:
-        """Everything, with ``header`` beside the table of the arrays; see ``compressed_text``."""
+    def packed(self, header: dict[str, object]) -> str:
+        """Everything, with ``header`` beside the table of the arrays."""
         table = json.dumps({**header, "arrays": self._entries}, separators=(",", ":"))
         head = table.encode()
         start = 4 + len(head)
         padding = b"\0" * (-start % _ALIGNMENT)
         content = len(head).to_bytes(4, "little") + head + padding + b"".join(self._blobs)
-        return compressed_text(content, is_draft=is_draft)
+        return compressed_text(content)
 
 
-def compressed_text(content: bytes, *, is_draft: bool = False) -> str:
-    """Gzipped and base64; the same content always gives the same text.
-
-    One that is soon replaced by another need not be small: it takes a third of the time.
-    """
-    return base64.b64encode(gzip.compress(content, 1 if is_draft else 9, mtime=0)).decode("ascii")
+def compressed_text(content: bytes) -> str:
+    """Gzipped and base64; the same content always gives the same text."""
+    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode("ascii")
 
 
 _NORMAL_LEVELS = 127  # of a signed 8-bit number
@@ -264,13 +261,8 @@ def scene_text(recording: Recording) -> str:
     return pack.packed({**scene, **legs, "foot_radius": visuals.foot_radius})
 
 
-def content_text(
-    content: ReplayContent, title: str, version: str = "", *, is_draft: bool = False
-) -> str:
-    """What happens, packed; ``version`` tells one text of a live page from the next.
-
-    An ``is_draft`` is packed in less time and more bytes.
-    """
+def content_text(content: ReplayContent, title: str, version: str = "") -> str:
+    """What happens, packed; ``version`` tells one text of a live page from the next."""
     pack = Pack()
     rate, frames = replay_frames(content.recording)
     highest = float(np.percentile(frames["forces"], _FORCE_PERCENTILE))
@@ -308,7 +300,7 @@ def content_text(
     for name, other in (("ghost", content.ghost), ("written", content.written)):
         if other is not None:
             header[name] = _add_frames(pack, f"{name}.", *replay_frames(other))
-    return pack.packed(header, is_draft=is_draft)
+    return pack.packed(header)
 
 
 def replay_frames(recording: Recording) -> tuple[float, dict[str, np.ndarray]]:
@@ -406,8 +398,8 @@ def reduced(curve: MarginCurve) -> MarginCurve:
     if step <= 1:
         return curve
     known = np.where(np.isnan(curve.margin), np.inf, curve.margin)
-    padded = np.pad(known, (0, -len(known) % step), constant_values=np.inf).reshape(-1, step)
-    rows = step * np.arange(len(padded)) + padded.argmin(axis=1)
+    edges = range(0, len(known), step)
+    rows = np.array([start + int(known[start : start + step].argmin()) for start in edges])
     return replace(curve, time=curve.time[rows], margin=curve.margin[rows], worst=curve.worst[rows])
 
 

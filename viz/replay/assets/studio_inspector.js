@@ -27,7 +27,16 @@ class Inspector {
     rows.replaceChildren(...bar.slots.map((slot) => this.row(bar, slot, editor, timeUnit)));
     if (bar.broken) rows.append(element("p", { className: "broken", textContent: bar.broken }));
     if (isOwn(bar) && bar.more.length) rows.append(this.adder(bar, editor));
+    if (isOwn(bar)) this.offer(bar, rows);
     return null;
+  }
+
+  // Ways to make what is computed a number of its own, asked for where there is such.
+  async offer(bar, rows) {
+    const { shape } = this;
+    if (bar.runs < 2 && bar.slots.every((slot) => slot.span)) return;
+    const offers = await this.studio.offers(bar);
+    if (shape === this.shape && offers.length) rows.append(buttonsOf(offers));
   }
 
   // What is typed is not meant: leaving the field would save it.
@@ -62,7 +71,7 @@ class Inspector {
   row(bar, slot, editor, timeUnit) {
     this.bar = bar;
     const row = element("label");
-    const [name, hint = ""] = ARGUMENTS[slot.name] ?? [readable(slot.name)];
+    const [name, hint = ""] = ARGUMENTS[slot.name] ?? [readable(slot.name), ARGUMENTS[slot.of]?.[1]];
     const unit = unitOf(slot, timeUnit);
     row.title = [`${slot.name}: ${hint || name.toLowerCase()}`, unit && `in ${unitName(unit)}`].filter(Boolean).join(", ");
     row.append(element("span", { textContent: name }));
@@ -71,7 +80,7 @@ class Inspector {
       return row;
     }
     const isWord = typeof slot.value === "string";
-    const words = isWord ? editor.words[`${bar.name}.${slot.name}`] ?? editor.words[slot.name] : null;
+    const words = isWord ? [`${bar.name}.${slot.name}`, slot.name, slot.of].map((key) => editor.words[key]).find(Boolean) : null;
     const input = element(words ? "select" : "input");
     if (words) input.append(...[...new Set([...words, slot.value])].map((word) => new Option(word)));
     else Object.assign(input, isWord ? { type: "text" } : { type: "number", step: stepOf(slot) });

@@ -165,7 +165,7 @@ class Studio {
   insert(title, values = {}) {
     const site = this.placeOfNew();
     this.made = { count: 1, back: title === LIFT_AND_DOWN ? 1 : 0 };
-    if (site) this.send({ op: "insert", site, title, values }, true);
+    this.send(site ? { op: "insert", site, title, values } : { op: "begin", title }, true);
   }
 
   // The call behind which something new is put: the chosen one, else the last.
@@ -174,6 +174,20 @@ class Studio {
     if (isOwn(this.bar())) return this.bar().site;
     const own = bars.filter(isOwn).sort((a, b) => a.span[2] - b.span[2]);
     return own[own.length - 1]?.site;
+  }
+
+  // What else can be done with a call, such as writing out its loop: orders with their titles.
+  async offers({ site, number }) {
+    const { offers = [] } = await this.post("edit", { op: "offers", site, number, base: this.editor.base });
+    return offers.map(({ title, ...order }) => ({
+      text: title, hint: "changes the file; Undo takes it back", act: () => this.rewrite({ ...order, site, number }),
+    }));
+  }
+
+  rewrite(order) {
+    this.made = { count: 1 };
+    this.inspector.forget();
+    this.send(order, true);
   }
 
   // A number or word for an argument of the chosen call; a draft is shown, but not saved. Jumps are

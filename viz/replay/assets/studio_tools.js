@@ -24,7 +24,8 @@ class Tools {
     this.say.setAttribute("role", "status");
     this.changes = element("div", { id: "studio-changes", className: "buttons" });
     this.fill(studio);
-    this.box.append(this.tabs, this.say, this.robot, this.row, this.changes);
+    this.notes = element("p", { id: "studio-notes" });
+    this.box.append(this.tabs, this.say, this.robot, this.row, this.changes, this.notes);
   }
 
   fill(studio) {
@@ -103,6 +104,7 @@ class Tools {
     enable("undo", editor.undo);
     enable("redo", editor.redo);
     for (const name of ["duplicate", "delete", "earlier", "later", "copy"]) enable(name, count);
+    this.notes.textContent = (editor.notes ?? []).join(" ");
     this.box.querySelector("[data-ask=mend]").hidden = header.verdict?.ok ?? true;
     const tabs = editor.motions.map((motion) => {
       const tab = element("button", { textContent: readable(motion), title: `The motion ${motion}() of ${editor.file}` });
@@ -123,11 +125,7 @@ class Tools {
 
   // Changes that are proposed, each with a button that makes it.
   offer(changes) {
-    this.changes.replaceChildren(...changes.map(({ text, hint, act }) => {
-      const button = element("button", { textContent: text, title: hint });
-      button.addEventListener("click", act);
-      return button;
-    }));
+    this.changes.replaceChildren(...buttonsOf(changes).children);
   }
 
   get told() {
@@ -157,4 +155,14 @@ class Tools {
     document.body.append(dialog);
     dialog.showModal();
   }
+}
+
+function buttonsOf(changes) {
+  const box = element("div", { className: "buttons" });
+  box.append(...changes.map(({ text, hint, act }) => {
+    const button = element("button", { textContent: text, title: hint });
+    button.addEventListener("click", act);
+    return button;
+  }));
+  return box;
 }

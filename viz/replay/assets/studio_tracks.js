@@ -18,7 +18,6 @@ class Tracks {
     this.ruler = document.createElement("canvas").getContext("2d");
     this.ruler.font = LABEL_FONT;
     this.widths = new Map();
-    this.shape = "";
     view.listen(this.box, LANE_LEFT, LANE_RIGHT);
     this.box.addEventListener("pointerdown", (event) => this.onPointer(event));
     this.box.addEventListener("click", (event) => this.onClick(event));
@@ -55,7 +54,9 @@ class Tracks {
     this.shape = shape;
     this.made.clear();
     this.strips = new Map();
-    this.box.replaceChildren(...found.map(([lane, rows]) => this.lane(lane, rows)), this.head);
+    const empty = element("p", { textContent: "No moves yet: insert one." });
+    const rows = found.map(([lane, count]) => this.lane(lane, count));
+    this.box.replaceChildren(...(rows.length ? rows : [empty]), this.head);
   }
 
   lane(lane, rows) {

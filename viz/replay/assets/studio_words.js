@@ -98,11 +98,13 @@ function toldOf(bar) {
   ].filter(Boolean).join("\n");
 }
 
-function unitOf({ name, is_angle: isAngle }, timeUnit) {
+function unitOf({ name, of, is_angle: isAngle }, timeUnit) {
+  const names = [name, of, name.split(".").pop()]; // points[0].z is a z
+  const isOne = (list) => names.some((one) => list.includes(one));
   if (isAngle) return "°";
-  if (LENGTHS.includes(name)) return "m";
-  if (TIMES.includes(name)) return timeUnit;
-  return ANGLE_NAMES.includes(name) ? "rad" : "";
+  if (isOne(LENGTHS)) return "m";
+  if (isOne(TIMES)) return timeUnit;
+  return isOne(ANGLE_NAMES) ? "rad" : "";
 }
 
 function unitName(unit) {
