@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import final
 
 import viz
-from controller.studio.edits import PALETTE
+from controller.studio.edits import PALETTE, edited
 from controller.studio.orders import Answer, Bar, Order, Task
 from controller.studio.project import Project
 from controller.studio.running import Runner
@@ -134,7 +134,7 @@ class Studio:
         if order.get("op") == "paste":
             return pasted(source, order, self._copied)
         if order.get("op") != "change":
-            return edited_together(source, order)
+            return edited_together(source, order, edited)
         which = order.get("which")
         if type(which) is not int or not 0 <= which < len(self._changes):
             raise StudioError("a change is one of those that were proposed")

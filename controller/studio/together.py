@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
-from controller.studio.edits import edited
 from controller.studio.source import Site, Source
 from go2_wbc.errors import StudioError
 
 MOST = 1000  #: Calls that one order may concern
+
+Edit = Callable[[Source, Mapping[str, object]], Source]  #: See ``edits.edited``
 
 
 def copied(source: Source, order: Mapping[str, object]) -> tuple[str, ...]:
@@ -31,14 +32,15 @@ def pasted(source: Source, order: Mapping[str, object], texts: Sequence[str]) ->
     return source
 
 
-def edited_together(source: Source, order: Mapping[str, object]) -> Source:
+def edited_together(source: Source, order: Mapping[str, object], edit: Edit) -> Source:
     """The text after one edit, or several.
 
     Args:
         source: the text that is saved.
-        order: as ``edited`` takes it; or with ``op`` "set_many" and ``values``, several arguments
+        order: as ``edit`` takes it; or with ``op`` "set_many" and ``values``, several arguments
             of one call; "many" and ``orders``, each with its own site in the saved text; "copies"
             and ``sites``, copies of these calls behind ``site``.
+        edit: makes one edit.
 
     Raises:
         StudioError: if one of them cannot be made; none is then.
@@ -47,9 +49,9 @@ def edited_together(source: Source, order: Mapping[str, object]) -> Source:
     if op == "copies":
         return pasted(source, order, copied(source, order))
     if op == "set_many":
-        return _set_many(source, order)
+        return _set_many(source, order, edit)
     if op != "many":
-        return edited(source, order)
+        return edit(source, order)
     orders = order.get("orders")
     if not (isinstance(orders, list) and all(isinstance(one, dict) for one in orders)):
         raise StudioError("several edits need a list of them")
@@ -57,17 +59,17 @@ def edited_together(source: Source, order: Mapping[str, object]) -> Source:
     is_ahead = any(one.get("step") == -1 for one in orders)
     sites = _sites({"sites": [one.get("site") for one in orders]})
     for _, one in sorted(zip(sites, orders, strict=True), key=lambda p: p[0], reverse=not is_ahead):
-        source = edited_together(source, one)
+        source = edited_together(source, one, edit)
     return source
 
 
-def _set_many(source: Source, order: Mapping[str, object]) -> Source:
+def _set_many(source: Source, order: Mapping[str, object], edit: Edit) -> Source:
     values = order.get("values")
     if not (isinstance(values, dict) and values):
         raise StudioError("several arguments need their values by their names")
     for name, value in values.items():
         one = {**order, "op": "set", "name": name, "value": value}
-        source = edited(source, one)
+        source = edit(source, one)
         order = {**order, "site": list(source.site or ())}
     return source
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import pytest
 
+from controller.studio.edits import edited
 from controller.studio.source import Source
 from controller.studio.together import copied, edited_together, pasted
 from go2_wbc.errors import StudioError
@@ -46,7 +47,7 @@ def _sites(*names: str) -> list[list[int]]:
 
 def _done(op: str, names: Sequence[str], **more: object) -> str:
     orders = [{"op": op, "site": site, **more} for site in _sites(*names)]
-    return edited_together(SOURCE, {"op": "many", "orders": orders}).data.decode()
+    return edited_together(SOURCE, {"op": "many", "orders": orders}, edited).data.decode()
 
 
 def test_calls_are_deleted_together_whatever_their_order() -> None:
@@ -67,7 +68,7 @@ def test_a_block_makes_way_and_comes_back() -> None:
 def test_several_arguments_are_set_at_once() -> None:
     (site,) = _sites("foot")
     order = {"op": "set_many", "site": site, "values": {"z": 0.12, "x": 0.05}}
-    after = edited_together(SOURCE, order)
+    after = edited_together(SOURCE, order, edited)
     assert after.data.decode() == LINE.replace("z=0.1, over=0.5", "z=0.12, over=0.5, x=0.05")
     assert after.slots(after.site or (0, 0))[0].value == "FR", "the place is that of the call"
 
@@ -76,7 +77,7 @@ def test_copies_go_behind_the_last_in_their_order() -> None:
     order = {"op": "copies", "sites": _sites("down", "foot"), "site": _sites("down")[0]}
     foot, down = '.foot("FR", z=0.1, over=0.5)', '.down("FR", over=0.5)'
     expected = LINE.replace(down, f"{down}{foot}\n    line = line{down}")  # not too long a line
-    assert edited_together(SOURCE, order).data.decode() == expected
+    assert edited_together(SOURCE, order, edited).data.decode() == expected
 
 
 def test_what_is_copied_is_laid_out_as_where_it_is_pasted() -> None:
@@ -100,7 +101,7 @@ def test_what_is_copied_is_laid_out_as_where_it_is_pasted() -> None:
 )
 def test_what_is_no_edit_is_refused(order: dict[str, object]) -> None:
     with pytest.raises(StudioError):
-        edited_together(SOURCE, order)
+        edited_together(SOURCE, order, edited)
 
 
 def test_nothing_is_pasted_before_something_is_copied() -> None:
