@@ -221,3 +221,24 @@ def test_a_file_without_a_motion_does_not_open(tmp_path: Path) -> None:
     with pytest.raises(StudioError, match="defines no motion"):
         Studio(file, None, 0)
     assert time.monotonic() - start < running.LONGEST_WORK
+
+
+def test_another_motion_of_the_file_is_chosen(studio: Studio, file: Path) -> None:
+    assert "unknown motion" in str(studio.choose({"motion": "bow"})["error"])
+    other = GREET + "\n\n" + GREET[GREET.index("@motion") :].replace("greet", "bow")
+    file.write_text(other, encoding="utf-8")
+    _look(studio)
+    assert studio.choose({"motion": "bow"}) == {}
+    assert studio.motion == "bow"
+    assert studio.choose({"motion": "greet"}) == {}
+
+
+def test_what_is_no_song_beside_the_file_is_refused(studio: Studio, file: Path) -> None:
+    for name in ("../song.wav", "song.wav", 7):
+        assert "unknown song" in str(studio.music({"name": name})["error"])
+    file.with_name("song.wav").write_bytes(b"no sound")
+    assert "song.wav" in str(studio.music({"name": "song.wav"})["error"])
+
+
+def test_nothing_is_copied_from_where_no_call_ends(studio: Studio) -> None:
+    assert "no call ends" in str(studio.copy({"sites": [[1, 1]]})["error"])

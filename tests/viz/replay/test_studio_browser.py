@@ -70,6 +70,7 @@ def test_an_edge_is_dragged(tab: Tab, file: Path) -> None:
     mouse.move(right - 3 + 0.2 * second, middle, steps=3)
     tab.wait_for(f"{SAID} === 'not saved yet' && Math.abs(replay.data.duration - 3.5) > 0.1")
     assert file.read_text(encoding="utf-8") == GREET, "a draft is not saved"
+    assert tab.page.locator("[data-slot=over]").input_value() == "0.8", "numbers follow the hand"
     mouse.move(right - 3 + 0.3 * second, middle, steps=2)
     mouse.up()
     tab.wait_for(f"{SAID} === 'saved'")

@@ -208,6 +208,19 @@ def test_several_bars_are_chosen_and_moved_by_keys(tab: Tab, file: Path) -> None
     assert file.read_text(encoding="utf-8") == DANCE
 
 
+def test_several_bars_are_dragged_past_the_next(tab: Tab, file: Path) -> None:
+    tab.page.locator("[data-bar='2']").first.click()
+    tab.page.locator("[data-bar='3']").first.click(modifiers=["Shift"])
+    box = tab.page.locator("[data-bar='2']").bounding_box() or {}
+    tab.page.mouse.move(box["x"] + 10, box["y"] + 8)
+    tab.page.mouse.down()
+    tab.page.mouse.move(box["x"] + 10 - box["width"], box["y"] + 8, steps=3)
+    tab.page.mouse.up()
+    tab.wait_for(SETTLED)
+    assert "is the first call of its chain" in tab.text("#studio-say"), "they start a line"
+    assert file.read_text(encoding="utf-8") == DANCE
+
+
 def test_moves_are_copied_into_another_motion(tab: Tab, file: Path) -> None:
     tab.page.locator("[data-bar='2']").first.click()
     tab.page.locator("[data-bar='3']").first.click(modifiers=["Shift"])

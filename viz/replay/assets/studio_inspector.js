@@ -59,6 +59,14 @@ class Inspector {
     this.shape = "";
   }
 
+  // While a hand is at it, before the server has answered.
+  follow(values) {
+    for (const [name, value] of Object.entries(values)) {
+      const input = this.box.querySelector(`[data-slot="${name}"]`);
+      if (input && input !== document.activeElement) input.value = value;
+    }
+  }
+
   // Other values in the same fields; the one that is typed into stays.
   refresh(bar) {
     this.bar = bar;

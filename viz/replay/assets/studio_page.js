@@ -98,6 +98,13 @@ class Studio {
     if (!this.chosen.has(this.selected)) this.selected = indexes[indexes.length - 1] ?? null;
   }
 
+  // What the hand is at is what the inspector shows; the picture stays where it is.
+  take(index) {
+    if (!this.chosen.has(index)) this.choose([index]);
+    this.selected = index;
+    this.inspector.use(this.bar(), this.editor, this.timeUnit, this.chosen.size);
+  }
+
   // `how` "more" adds a bar to what is chosen, or takes it out.
   select(index, how = "") {
     if (how === "more" && this.chosen.has(index) && this.chosen.size > 1) {
@@ -197,6 +204,7 @@ class Studio {
   }
 
   setMany(bar, values, isCommitted) {
+    this.inspector.follow(values);
     if (!isCommitted && bar.parts.includes("robot")) return;
     const { site, number } = bar;
     const entries = Object.entries(values);

@@ -203,6 +203,7 @@ class Tracks {
       if (this.view.pinched) return;
       offset = now.clientX - from;
       if (Math.abs(offset) < 3 && !this.dragged) return;
+      if (!this.dragged) this.studio.take(index);
       this.dragged = { index };
       button.classList.add("held");
       if (!isEdge) {
@@ -222,7 +223,6 @@ class Tracks {
       this.dragged = null;
       if (!was) return;
       this.isDragDone = true;
-      this.studio.choose([index]);
       if (isEdge) this.studio.set(bar, lengthOf(bar).name, value, true);
       else if (Math.abs(offset) > button.offsetWidth / 2) this.studio.act(offset < 0 ? "earlier" : "later");
       else this.draw();
