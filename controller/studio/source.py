@@ -122,6 +122,10 @@ class Source:
         layout = re.match(r"\s*", self._text(self._link(call)))
         return self._behind(call, (layout[0] if layout else "") + code)
 
+    def offset(self, site: Site) -> int:
+        """The first byte behind a call."""
+        return self._span(self._call(site))[1]
+
     def text(self, site: Site) -> str:
         """A call as it is written, such as ``.hold(0.5)``."""
         return self._text(self._link(self._call(site))).strip()
@@ -148,7 +152,10 @@ class Source:
             where = "first" if step < 0 else "last"
             raise StudioError(f"{self._name(call)}() is the {where} call of its chain")
         links = sorted([self._link(call), self._link(other)])
-        first, second = ((start, self._tail(end)) for start, end in links)
+        if all(self._text(link)[0] in "\r\n" for link in links):  # their comments go with them
+            first, second = ((start, self._tail(end)) for start, end in links)
+        else:  # a comment would swallow what came behind it: layout and comments stay
+            first, second = links = [(self._dot(start), end) for start, end in links]
         middle = self._text((first[1], second[0]))
         (_, one), (_, other_end) = links
         # Where the two end then, their comments left out.
@@ -221,6 +228,10 @@ class Source:
         before = self.data[start : self._name_start(call)]
         other = list(re.finditer(rb"#[^\r\n]*|\)", before))  # a bracket around the rest
         return start + (other[-1].end() if other else 0), end
+
+    def _dot(self, start: int) -> int:
+        """Where a link of a chain begins, behind the white space."""
+        return start + len(self.data[start:]) - len(self.data[start:].lstrip())
 
     def _tail(self, end: int) -> int:
         """The end of the comment on the line that ends in ``end``."""

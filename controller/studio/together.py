@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 
 from controller.studio.source import Site, Source
 from go2_wbc.errors import StudioError
@@ -39,7 +40,9 @@ def edited_together(source: Source, order: Mapping[str, object], edit: Edit) -> 
         source: the text that is saved.
         order: as ``edit`` takes it; or with ``op`` "set_many" and ``values``, several arguments
             of one call; "many" and ``orders``, each with its own site in the saved text; "copies"
-            and ``sites``, copies of these calls behind ``site``.
+            and ``sites``, copies of these calls behind ``site``; "move" and ``sites``, they
+            themselves behind ``site``, or before it if ``is_ahead``. Neighbours in one chain are
+            exchanged, with their comments: ``step`` is -1 or 1.
         edit: makes one edit.
 
     Raises:
@@ -50,17 +53,38 @@ def edited_together(source: Source, order: Mapping[str, object], edit: Edit) -> 
         return pasted(source, order, copied(source, order))
     if op == "set_many":
         return _set_many(source, order, edit)
+    if op == "move":
+        return _moved(source, order, edit)
     if op != "many":
         return edit(source, order)
     orders = order.get("orders")
     if not (isinstance(orders, list) and all(isinstance(one, dict) for one in orders)):
         raise StudioError("several edits need a list of them")
-    # From the end, so that the places before stay; what moves ahead makes way from the front.
-    is_ahead = any(one.get("step") == -1 for one in orders)
     sites = _sites({"sites": [one.get("site") for one in orders]})
-    for _, one in sorted(zip(sites, orders, strict=True), key=lambda p: p[0], reverse=not is_ahead):
-        source = edited_together(source, one, edit)
+    for _, one in sorted(zip(sites, orders, strict=True), key=lambda pair: pair[0], reverse=True):
+        source = edited_together(source, one, edit)  # from the end: the places before stay
     return source
+
+
+def _moved(source: Source, order: Mapping[str, object], edit: Edit) -> Source:
+    sites, (target,) = sorted(_sites(order)), _sites({"sites": [order.get("site")]})
+    if len(sites) == 1 and order.get("step") in (-1, 1):
+        with suppress(StudioError):
+            return edit(source, {**order, "op": "swap", "site": list(sites[0])})
+    texts = copied(source, order)
+    for site in reversed([site for site in sites if site > target]):
+        source = source.delete(site)
+    source = pasted(source, {"site": list(target)}, texts)
+    if order.get("is_ahead") is True:
+        if len(texts) > 1:
+            raise StudioError("one at a time before the first move of all")
+        source = source.swap(source.site or target, -1)
+    end = source.offset(source.site or target)
+    for site in reversed([site for site in sites if site < target]):
+        after = source.delete(site)
+        end -= len(source.data) - len(after.data)
+        source = after
+    return Source(source.data, end)
 
 
 def _set_many(source: Source, order: Mapping[str, object], edit: Edit) -> Source:

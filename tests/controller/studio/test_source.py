@@ -268,3 +268,23 @@ def test_the_library_can_be_edited_one_line_at_a_time() -> None:
                 assert len(_changed(data, source.set(site, slot.name, 0.123, number).data)) == 1
     assert bars > 500
     assert editable / bars > 0.8
+
+
+@pytest.mark.parametrize(
+    ("text", "after"),
+    [
+        (
+            "line = line.hold(0.1).home(over=1)  # last",
+            "line = line.home(over=1).hold(0.1)  # last",
+        ),
+        (
+            "line = (line.hold(0.1)  # one\n    .home(over=1)  # two\n)",
+            "line = (line.home(over=1)  # one\n    .hold(0.1)  # two\n)",
+        ),
+    ],
+)
+def test_no_comment_swallows_a_call_that_is_moved(text: str, after: str) -> None:
+    source = Source(text.encode())
+    moved = source.swap((1, text.index(")") + 1), 1)
+    assert moved.data.decode() == after
+    assert moved.text(moved.site or (0, 0)) == ".hold(0.1)"

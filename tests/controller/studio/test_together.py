@@ -57,12 +57,39 @@ def test_calls_are_deleted_together_whatever_their_order() -> None:
         assert ast.dump(ast.parse(_done("delete", names))) == ast.dump(ast.parse(expected))
 
 
-def test_a_block_makes_way_and_comes_back() -> None:
-    later = _done("swap", ["body"], step=1)
-    assert ".hold(0.4)" in later
-    assert later.index(".hold(0.4)") < later.index(".body(")
-    ahead = _done("swap", ["hold"], step=-1)
-    assert ahead.index(".hold(0.4)") < ahead.index(".body(")
+def _move(names: Sequence[str], target: str, **more: object) -> Source:
+    sites, (site,) = _sites(*names), _sites(target)
+    order = {"op": "move", "sites": sites, "site": site, **more}
+    return edited_together(SOURCE, order, edited)
+
+
+def _name_at(source: Source, end: tuple[int, int] | None) -> str:
+    return source.text(end or (0, 0)).partition("(")[0]
+
+
+@pytest.mark.parametrize("step", [0, 1])
+def test_a_call_goes_behind_another(step: int) -> None:
+    after = _move(["body"], "hold", step=step)
+    assert "Timeline().hold(0.4)" in after.data.decode()
+    assert _name_at(after, after.site) == ".body"
+
+
+def test_calls_go_over_several_lines_and_back() -> None:
+    later = _move(["body", "hold"], "down")
+    assert 'down("FR", over=0.5).body(z=-0.03, over=0.6).hold(0.4)' in later.data.decode()
+    assert _name_at(later, later.site) == ".hold"
+    ahead = _move(["foot", "down"], "body")
+    moved = '.body(z=-0.03, over=0.6).foot("FR", z=0.1, over=0.5).down("FR", over=0.5).hold(0.4)'
+    assert moved in ahead.data.decode()
+    assert _name_at(ahead, ahead.site) == ".down"
+
+
+def test_one_call_goes_before_the_first_of_all() -> None:
+    after = _move(["hold"], "body", is_ahead=True)
+    text = after.data.decode()
+    assert text.index(".hold(0.4)") < text.index(".body(")
+    with pytest.raises(StudioError, match="one at a time"):
+        _move(["foot", "hold"], "body", is_ahead=True)
 
 
 def test_several_arguments_are_set_at_once() -> None:

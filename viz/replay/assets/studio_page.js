@@ -146,11 +146,32 @@ class Studio {
     const sites = [...new Map(bars.map((bar) => [String(bar.site), bar.site])).values()];
     if (!sites.length) return null;
     const step = { earlier: -1, later: 1 }[op];
-    this.made = { count: op === "delete" ? 0 : sites.length, isLast: step !== 1 };
+    if (step) return this.move(this.order().place + step);
+    this.made = { count: op === "delete" ? 0 : sites.length, isLast: true };
     const last = sites[sites.length - 1];
     if (op === "duplicate" && sites.length > 1) return this.send({ op: "copies", sites, site: last }, true);
-    const orders = sites.map((site) => (step ? { op: "swap", site, step } : { op, site }));
+    const orders = sites.map((site) => ({ op, site }));
     return this.send(orders.length > 1 ? { op: "many", orders } : orders[0], true);
+  }
+
+  // The calls of the file that are not chosen, by their starts, and before which of them the chosen are.
+  order() {
+    const sites = new Set(this.own().map((bar) => String(bar.site)));
+    const known = new Set();
+    const bars = this.editor.bars.filter((bar) => isOwn(bar) && !known.has(String(bar.site)) && known.add(String(bar.site)));
+    const others = bars.filter((bar) => !sites.has(String(bar.site)));
+    const first = bars.findIndex((bar) => sites.has(String(bar.site)));
+    return { others, place: bars.slice(0, Math.max(first, 0)).filter((bar) => others.includes(bar)).length, sites: bars.filter((bar) => !others.includes(bar)).map((bar) => bar.site) };
+  }
+
+  // What is chosen goes before the `place`-th of the others.
+  move(place) {
+    const { others, place: was, sites } = this.order();
+    if (place === was || place < 0 || place > others.length || !others.length) return;
+    this.made = { count: sites.length, isLast: true };
+    const step = Math.abs(place - was) === 1 ? place - was : 0;
+    const target = others[Math.max(place - 1, 0)].site;
+    this.send({ op: "move", sites, site: target, step, is_ahead: place === 0 }, true);
   }
 
   async copy(isCut = false) {

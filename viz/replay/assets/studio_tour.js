@@ -3,7 +3,7 @@
 
 const TOUR_KEY = "go2-wbc studio tour";
 const TOUR = [
-  ["#bars", "Moves over time", "Each bar is a move of your file. Drag its right end to make it longer, drag it past its neighbour to exchange the two, click it to see the pose that it leads to."],
+  ["#bars", "Moves over time", "Each bar is a move of your file. Drag its right end to make it longer, drag it to another place between others, click it to see the pose that it leads to."],
   ["#inspector", "Numbers and words", "The chosen move's numbers, with units. Each change is one change in your Python file; Undo takes it back. What you type in an editor appears here."],
   ["#stage", "Hands", "Of the chosen move you can take the paw or the trunk and pull it. Red means that the leg cannot reach so far. Drag beside the robot to look around."],
   ["#badge", "Can the robot do it?", "While you drag, the motion is checked: green is possible, red names the first limit that is broken, and the moves that break it turn red. \u201cMake it possible\u201d proposes changes."],

@@ -15,6 +15,8 @@ class Tracks {
     this.box.setAttribute("role", "group");
     this.box.setAttribute("aria-label", "Moves over time");
     this.head = element("i", { className: "playhead" });
+    this.mark = element("i", { className: "playhead mark", hidden: true });
+    this.goal = null; // where what is dragged would go
     this.ruler = document.createElement("canvas").getContext("2d");
     this.ruler.font = LABEL_FONT;
     this.widths = new Map();
@@ -56,7 +58,7 @@ class Tracks {
     this.strips = new Map();
     const empty = element("p", { textContent: "No moves yet: insert one." });
     const rows = found.map(([lane, count]) => this.lane(lane, count));
-    this.box.replaceChildren(...(rows.length ? rows : [empty]), this.head);
+    this.box.replaceChildren(...(rows.length ? rows : [empty]), this.head, this.mark);
   }
 
   lane(lane, rows) {
@@ -184,7 +186,7 @@ class Tracks {
     else this.studio.select(index, event.shiftKey || event.ctrlKey || event.metaKey ? "more" : "");
   }
 
-  // The end is dragged to make a call longer, the rest to put it before or behind its neighbour.
+  // The end is dragged to make a call longer, the rest to put it between others.
   onPointer(event) {
     const index = indexOf(event.target);
     this.isDragDone = false;
@@ -208,6 +210,7 @@ class Tracks {
       button.classList.add("held");
       if (!isEdge) {
         button.style.transform = `translateX(${offset}px)`;
+        this.aim(now.clientX);
         return;
       }
       value = this.studio.durationFor(bar, bar.span[2] + offset / perSecond, SNAP / perSecond);
@@ -220,16 +223,28 @@ class Tracks {
       button.style.transform = "";
       button.classList.remove("held");
       const was = this.dragged;
-      this.dragged = null;
+      const { goal } = this;
+      this.dragged = this.goal = null;
+      this.mark.hidden = true;
       if (!was) return;
       this.isDragDone = true;
       if (isEdge) this.studio.set(bar, lengthOf(bar).name, value, true);
-      else if (Math.abs(offset) > button.offsetWidth / 2) this.studio.act(offset < 0 ? "earlier" : "later");
+      else if (goal !== null && goal !== this.studio.order().place) this.studio.move(goal);
       else this.draw();
     };
     button.addEventListener("pointermove", move);
     button.addEventListener("pointerup", drop, { once: true });
     button.addEventListener("pointercancel", drop, { once: true });
+  }
+
+  // Before which of the other calls the dragged ones would go, with a mark there.
+  aim(clientX) {
+    const t = this.view.from + (clientX - this.box.getBoundingClientRect().left - LANE_LEFT) / this.width * this.view.length;
+    const { others } = this.studio.order();
+    this.goal = others.filter(({ span: [start, , end] }) => (start + end) / 2 < t).length;
+    const at = this.goal ? others[this.goal - 1].span[2] : others[0]?.span[0] ?? 0;
+    this.mark.hidden = false;
+    this.mark.style.transform = `translateX(${LANE_LEFT + this.xAt(at)}px)`;
   }
 
   onKey(event) {
