@@ -8,7 +8,7 @@ const LANE_NAMES = {
 };
 const CALL_NAMES = {
   body: "Move", body_path: "Path", pose: "Pose", posture: "Posture", look_at: "Look", foot: "Move", leg: "Bend",
-  joint: "Bend", unweight: "Unload", down: "Down", home: "Home", step: "Step", walk: "Walk", turn: "Turn",
+  joint: "Bend", unweight: "Unload", down: "Put down", home: "Home", step: "Step", walk: "Walk", turn: "Turn",
   side_step: "Side step", path: "Walk a path", hold: "Pause", at: "Go to", bpm: "Tempo", on_beats: "On the beats",
   then: "Then", together: "Together", repeat: "Repeat", mirror: "Mirror", scale_time: "Tempo", scale: "Size",
   scale_shifts: "Shifts", scale_jumps: "Jumps", shift_height: "Height", reverse: "Backwards", loop: "Loop",
@@ -16,7 +16,7 @@ const CALL_NAMES = {
 };
 // What more (> 0) and less of a value is called, and the least that is told.
 const WAYS = {
-  body: { z: ["Up", "Down"], pitch: ["Nose down", "Nose up"], yaw: ["Turn left", "Turn right"],
+  body: { z: ["Rise", "Sink"], pitch: ["Nose down", "Nose up"], yaw: ["Turn left", "Turn right"],
     roll: ["Lean right", "Lean left"], x: ["Forward", "Back"], y: ["Left", "Right"] },
   foot: { z: ["Raise", "Lower"], x: ["Forward", "Back"], y: ["Left", "Right"] },
   step: { x: ["Step", "Step back"], y: ["Step left", "Step right"], yaw: ["Step round", "Step round"] },
@@ -47,7 +47,7 @@ const ARGUMENTS = { // name, and what it says besides its unit
 };
 
 // Where there is room for no word.
-const SIGNS = { Up: "\u2191", Down: "\u2193", Raise: "\u2191", Lower: "\u2193", Forward: "\u2192", Back: "\u2190", "Nose down": "\u2198",
+const SIGNS = { Rise: "\u2191", Sink: "\u2193", "Put down": "\u2193", Raise: "\u2191", Lower: "\u2193", Forward: "\u2192", Back: "\u2190", "Nose down": "\u2198",
   "Nose up": "\u2197", "Turn left": "\u21b6", "Turn right": "\u21b7", "Lean right": "\u21bb", "Lean left": "\u21ba", Home: "\u2302", Pause: "\u2016",
   Left: "\u2196", Right: "\u2199", Look: "\u25ce", Walk: "\u2192", Step: "\u2192" };
 
