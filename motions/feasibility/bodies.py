@@ -86,13 +86,14 @@ class SelfCollision:
         """What ``nearest`` says of each configuration; faster if they follow one another."""
         joints, found = q[:, 7:], []
         last, seen = np.full(len(self.names), -np.inf), np.zeros_like(self.levers)
+        nearest = 0
         for row in range(len(q)):
             pin.updateGeometryPlacements(
                 self._model, self._data, self.geometry, self._results, q[row]
             )
-            bounds = last - (self.levers * np.abs(joints[row] - seen)).sum(axis=1)
-            likely = int(np.argmin(bounds))
-            least, nearest = self._distance(likely), likely
+            moved = np.einsum("ij,ij->i", self.levers, np.abs(joints[row] - seen))
+            bounds, likely = last - moved, nearest  # where nothing moves far it stays so
+            least = self._distance(likely)
             last[likely], seen[likely] = least, joints[row]
             for pair in np.flatnonzero(bounds <= least + SLACK).tolist():
                 if pair == likely or bounds[pair] > least + SLACK:

@@ -37,7 +37,7 @@ speed dJ/dt v / b, and as the plan's feet rest, dJ/dt v = -J a. Fast rocking mak
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -61,7 +61,7 @@ from go2_wbc.wbc.trajectory_loads import (
     slide,
 )
 from go2_wbc.world import World
-from motions.batch_kinematics import attitudes, turned, zero_moment_points
+from motions.batch_kinematics import attitudes, foot_centres, turned, zero_moment_points
 from motions.feasibility.report import Series
 from motions.plan.trajectory import Trajectory
 from motions.postures import NORMAL_FORCE_MAX
@@ -98,6 +98,14 @@ class Case:
     heavy: RobotModel  #: the robot that does it, with the load of the world
     world: World = World()  #: with the worst of what is uncertain
     limits: FeasibilityLimits = FeasibilityLimits()  #: what must be kept
+    places: Float[np.ndarray, "n 4 3"] = field(init=False)
+    """(n, 4, 3) where the feet's centres are [m], in the frame of the motion."""
+
+    def __post_init__(self) -> None:
+        """Place the feet."""
+        q, R = self.path.q, attitudes(self.path.rpy)
+        places = foot_centres(q[:, :3], R, q[:, 7:], self.model)
+        object.__setattr__(self, "places", places)
 
     def series(
         self,
@@ -162,6 +170,7 @@ CONTACT_RATE = 145.0
 more, as trunks lag their plan. Own choice, seen on motions that judge nothing."""
 SETTLED = 0.1
 """Time [s] after a touchdown, and before a lift-off, in which a foot without load may skid."""
+NEARBY = np.array([-2.0, 2.0]) * SETTLED  #: Times that hold all of these
 
 
 def forces_of(motion: Trajectory, model: RobotModel) -> Forces:
@@ -349,12 +358,11 @@ def passes_over_few(motion: Trajectory, limits: FeasibilityLimits) -> Bool[np.nd
 
 
 def _same_support(motion: Trajectory) -> list[Int[np.ndarray, " k"]]:
-    """Samples in which the same feet, at least one, stand in the same places."""
-    places = np.where(motion.stance[:, :, None], motion.p_feet[:, :, :2], np.nan)
-    keys = np.nan_to_num(np.round(places.reshape(-1, 8), 6), nan=np.inf)
-    _, group = np.unique(keys, axis=0, return_inverse=True)
-    ordered = np.argsort(group, kind="stable")
-    groups = np.split(ordered, np.flatnonzero(np.diff(group[ordered])) + 1)
+    """Samples, one after the other, in which the same feet stand in the same places."""
+    places = np.where(motion.stance[:, :, None], motion.p_feet[:, :, :2], np.inf).reshape(-1, 8)
+    keys = np.round(places, 6)
+    changes = np.flatnonzero((keys[1:] != keys[:-1]).any(axis=1)) + 1
+    groups = np.split(np.arange(len(keys)), changes)
     return [rows for rows in groups if motion.stance[rows[0]].any()]
 
 
@@ -430,7 +438,8 @@ def _least_friction(case: Case) -> Float[np.ndarray, " n"]:
 
 def _settled(motion: Trajectory) -> Bool[np.ndarray, "n 4"]:
     """Where feet stand, and have stood and will stand for ``SETTLED``; the motion's ends count."""
-    stands = motion.stance.copy()
+    stands, times = motion.stance.copy(), motion.times
     for edge, leg in np.argwhere(motion.stance[1:] != motion.stance[:-1]):
-        stands[np.abs(motion.times - motion.times[edge]) < SETTLED, leg] = False
+        near = slice(*np.searchsorted(times, times[edge] + NEARBY).tolist())
+        stands[near, leg] &= np.abs(times[near] - times[edge]) >= SETTLED
     return stands

@@ -63,8 +63,7 @@ def resistance(
     count = len(motion.times)
     rows = np.unique(np.append(np.arange(0, count, EVERY), count - 1))
     v, a = motion.v[rows, 6:], motion.a[rows, 6:]
-    fed = WbcConfig().joint_friction.torque
-    rest = forces.joint_friction(v, world) - [fed(*both) for both in zip(v, a, strict=True)]
+    rest = forces.joint_friction(v, world) - WbcConfig().joint_friction.torque(v, a)
     taken, damped = _taken(motion, rows, rest, model)
     columns = [np.interp(motion.times, motion.times[rows], column) for column in taken.T]
     return np.column_stack(columns), world.joint_friction * forces.VISCOUS * damped.mean(axis=0)
