@@ -119,7 +119,7 @@ class Studio:
             self._project.save(data)
             self._server.publish(self._content(shown))
             return site
-        return {"data": content_text(self._content(shown), shown.title)}
+        return {"data": content_text(self._content(shown), shown.title, is_brief=True)}
 
     def _edited(self, order: Mapping[str, object]) -> Source:
         source = Source(self._project.saved)

@@ -25,8 +25,9 @@ def serve(pipe: Connection) -> None:
     with suppress(EOFError, KeyboardInterrupt):
         order: Order = pipe.recv()
         from motions import FeasibilityChecker
+        from motions.memory import Memory
 
-        checker = FeasibilityChecker()
+        checker = FeasibilityChecker(memory=Memory())  # most of a motion is as it was
         pipe.send("loaded")
         while True:
             pipe.send(_answer(order, checker, pipe))

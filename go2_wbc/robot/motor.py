@@ -40,7 +40,7 @@ gets none.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, cast
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -53,6 +53,7 @@ from go2_wbc.records import Array12, Array18, ArrayNx12, packed
 from go2_wbc.robot.description import RobotDescription
 from go2_wbc.robot.state import JointCommand, Snapshot
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
+from go2_wbc.written import Written
 
 PerJoint = Annotated[tuple[float, ...], len(JOINT_NAMES)]
 """A number for each joint, in the order of ``JOINT_NAMES``."""
@@ -256,7 +257,7 @@ class JointFriction:
 
         ``a`` is in rad/s^2; of one instant or of many.
         """
-        return np.asarray(friction_torque.written(self, slice(None), v, a))
+        return np.asarray(cast("Written", friction_torque).written(self, slice(None), v, a))
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,7 +47,7 @@ from motions.language.keys import BalanceShift
 from motions.language.timeline import Timeline
 from motions.language.timeline_data import SAME
 from motions.plan.compiled_plan import Problem
-from motions.plan.tracks import Instants, LegTracks, Poses, Times, followed
+from motions.plan.tracks import Instants, LegTracks, Move, Poses, Times
 
 MARGINS = (0.08, 0.065, 0.05, 0.035, 0.02)
 """Distances [m] of the CoM to the edges of the support polygon that are tried, best first.
@@ -91,9 +91,9 @@ class Balancer:
         self._shifts, self._end = timeline.in_order(BalanceShift), timeline.end
         self._key_ends = sorted(key.end for key in timeline.keys)
 
-    def balance(self) -> tuple[Float[np.ndarray, "n 2"], list[Problem]]:
-        """What to add to the trunk's places [m] (n, 2), and the moments without a balanced pose."""
-        moves, last = [], np.zeros(2)
+    def balance(self) -> tuple[list[Move], list[Problem]]:
+        """What to add to the trunk's places [m], and the moments without a balanced pose."""
+        moves, last = list[Move](), np.zeros(2)
         problems: list[Problem] = []
         starts = [*(shift.start for shift in self._shifts), self._end]
         for shift, end in zip(self._shifts, starts[1:], strict=True):
@@ -105,7 +105,7 @@ class Balancer:
                     problems.append(Problem("balance", "trunk", knot, reason=str(error)))
                 moves.append((replace(shift, start=start, end=knot), last))
                 start = knot
-        return followed(self._times, np.zeros(2), moves), problems
+        return moves, problems
 
     def _knots(self, shift: BalanceShift, end: float) -> list[float]:
         """The end of the shift, and every later end of a key while it lasts."""
