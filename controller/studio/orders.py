@@ -46,6 +46,7 @@ class Bar:
     parts: tuple[str, ...]  #: what it moves: legs, "trunk", "robot" or "time"
     broken: str  #: the first limit that is broken there, in words; empty if none is
     slots: tuple[Slot, ...]  #: the arguments that are written in it
+    callers: tuple[tuple[tuple[int, int], int], ...] = ()  #: see ``motions.language.tracing``
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,5 +57,6 @@ class Answer:
     content: ReplayContent | None = None  #: the plan with its verdict, and how it was played
     bars: tuple[Bar, ...] = ()  #: by their starts
     told: str = ""  #: how playing went, in words
+    notes: tuple[str, ...] = ()  #: what is to be known of the file, in words
     changes: tuple[tuple[str, str], ...] = ()
     """Calls that make it possible, to be appended to the motion, each with its meaning."""
