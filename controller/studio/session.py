@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import final
 
 import viz
-from controller.studio.edits import PALETTE, edited
+from controller.studio.edits import PALETTE, edited, run_of, site_of
 from controller.studio.orders import Answer, Bar, Order, Task
 from controller.studio.project import Project
+from controller.studio.rewriting import offers
 from controller.studio.running import Runner
 from controller.studio.songs import heard, songs_beside
 from controller.studio.source import Source, parameters
@@ -21,6 +22,7 @@ from controller.studio.together import copied, edited_together, pasted
 from go2_wbc.curves import Ease
 from go2_wbc.errors import Go2WbcError, StudioError, unknown_name
 from go2_wbc.legs import LEGS
+from go2_wbc.motion_plan import Posture
 from motions.authoring import Value
 from motions.language.body_and_feet import POSES
 from motions.language.steps import STEP_GAITS
@@ -37,6 +39,7 @@ WORDS: Mapping[str, Sequence[str]] = {
     "gait": list(STEP_GAITS),
     "pose.name": list(POSES),
     "joint": ["hip", "thigh", "calf"],
+    "posture.stance": [posture.name for posture in Posture],
 }
 """Words that arguments may be, of all calls or of one; others can be written in the file."""
 
@@ -68,6 +71,7 @@ class Studio:
         self._changes: tuple[str, ...] = ()
         self._copied: tuple[str, ...] = ()
         self._motions: tuple[str, ...] = ()
+        self._bars: tuple[Bar, ...] = ()
         try:
             shown = self._run(self._project.saved)
             self.motion = shown.title
@@ -98,7 +102,8 @@ class Studio:
 
         Args:
             order: see ``edited_together``; besides ``op`` "undo" and "redo", "change" (see
-                ``mend``), and "paste" behind ``site`` what ``copy`` has taken. ``base`` is the
+                ``mend``), "offers" (what there is to be done for a bar, by ``site`` and ``number``)
+                and "paste" behind ``site`` what ``copy`` has taken. ``base`` is the
                 state of the file that the page knows, ``commit`` whether to save.
 
         Returns:
@@ -111,6 +116,10 @@ class Studio:
                     self.show()
                 if order.get("op") not in HISTORY and order.get("base") != self._base:
                     raise StudioError("the file was saved elsewhere: this is what it says now")
+                if order.get("op") == "offers":
+                    place = site_of(order.get("site")), run_of(self._with_callers(order))
+                    source = Source(self._project.saved)
+                    return {"offers": offers(source, self.motion or "", *place)}
                 return self._done(order)
             except StudioError as error:
                 return {"error": str(error)}
@@ -125,16 +134,20 @@ class Studio:
         shown = self._run(data)  # what is no motion is not saved
         if order.get("commit") is True:
             self._project.save(data)
+            self._bars = shown.bars
             self._server.publish(self._content(shown))
             return site
-        return {"data": content_text(self._content(shown), shown.title)}
+        return {"data": content_text(self._content(shown), shown.title, is_brief=True)}
 
     def _edited(self, order: Mapping[str, object]) -> Source:
         source = Source(self._project.saved)
         if order.get("op") == "paste":
             return pasted(source, order, self._copied)
         if order.get("op") != "change":
-            return edited_together(source, order, edited)
+            motion = self.motion or ""
+            return edited_together(
+                source, order, lambda text, one: edited(text, self._with_callers(one), motion)
+            )
         which = order.get("which")
         if type(which) is not int or not 0 <= which < len(self._changes):
             raise StudioError("a change is one of those that were proposed")
@@ -255,7 +268,18 @@ class Studio:
 
     def _run(self, data: bytes, task: Task = Task.CHECK) -> Answer:
         order = Order(self._project.path, data, self.motion, self._values, task)
-        return (self._runner if task is Task.CHECK else self._player).run(order)
+        answer = (self._runner if task is Task.CHECK else self._player).run(order)
+        if data == self._project.saved and answer.bars:
+            self._bars = answer.bars
+        return answer
+
+    def _with_callers(self, order: Mapping[str, object]) -> Mapping[str, object]:
+        """The order with the calls of helpers that the bar which it means runs in."""
+        meant = order.get("site"), order.get("number") or 0
+        for bar in self._bars:
+            if (list(bar.site), bar.number) == meant:
+                return {"callers": bar.callers, **order}
+        return order
 
     def _content(self, shown: Answer) -> ReplayContent:
         bars = [_bar(bar) for bar in shown.bars]
@@ -269,6 +293,7 @@ class Studio:
             "redo": self._project.can_redo,
             "palette": list(PALETTE),
             "songs": songs_beside(self._project.path),
+            "notes": shown.notes,
             "words": WORDS,
             "lanes": ["trunk", *(leg.name for leg in LEGS), "robot", "time"],
         }
@@ -280,6 +305,6 @@ class Studio:
 
 def _bar(bar: Bar) -> dict[str, object]:
     """A bar as the page needs it, with the arguments that could be added."""
-    given = {slot.name for slot in bar.slots}
+    given = {slot.of for slot in bar.slots}
     more = [name for name in parameters(bar.name) if name not in given]
     return {**asdict(bar), "more": more}

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 
-from controller.studio.source import Site, Source
+from controller.studio.source import Source
+from controller.studio.syntax import Site
 from go2_wbc.errors import StudioError
 
 MOST = 1000  #: Calls that one order may concern
