@@ -5,6 +5,7 @@
 const NUDGE = 0.05; // s, what a key makes a call longer or shorter
 const BEAT_NUDGE = 0.25; // beats, the same where the motion counts in beats
 const LIFT_AND_DOWN = "Lift and put down"; // of the palette, two calls
+const SLOWER = 1.2; // what the whole is slowed down by at first, where that is asked for
 const SNAP = 8; // px, a bar that ends this near a beat ends on it
 
 class Studio {
@@ -208,7 +209,7 @@ class Studio {
   async offers({ site, number }) {
     const { offers = [] } = await this.post("edit", { op: "offers", site, number, base: this.editor.base });
     return offers.map(({ title, ...order }) => ({
-      text: title, hint: "changes the file; Undo takes it back", act: () => this.rewrite({ ...order, site, number }),
+      text: title, hint: "changes the file; Undo takes it back", act: () => this.rewrite({ value: SLOWER, ...order, site, number }),
     }));
   }
 
