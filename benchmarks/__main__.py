@@ -23,6 +23,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("golden", "benchmarks.golden", "is every tick what it was, to the last bit?"),
     Command("plain", "benchmarks.plain", "does compiled code do what its own Python does?"),
     Command("speed", "benchmarks.speed", "processor time of the QP and of a control tick"),
+    Command("studio", "benchmarks.studio", "from the pointer to the verdict on the studio's page"),
     Command("probability", "benchmarks.probability", "is the stated chance the one that it has?"),
     Command("adversary", "benchmarks.adversary", "a search for motions that pass and fail"),
     Command("border", "benchmarks.border", "verdict and chance at the border of what is done"),

@@ -196,13 +196,17 @@ def parts_of(subject: str) -> tuple[str, ...]:
 
 def _curve(series: Series) -> MarginCurve:
     known = np.where(np.isnan(series.margins), np.inf, series.margins)
+    worst, least = np.zeros(len(known), dtype=int), known[:, 0].copy()
+    for column in range(1, known.shape[1]):  # over rows as short as these argmin() takes longer
+        worst[known[:, column] < least] = column
+        np.minimum(least, known[:, column], out=least)
     return MarginCurve(
         name=series.check,
         unit=series.unit,
         time=series.times,
-        margin=series.least_margins(),
+        margin=np.where(np.isinf(least), np.nan, least),
         subjects=series.subjects,
-        worst=known.argmin(axis=1),
+        worst=worst,
         tight=series.tight,
     )
 

@@ -151,6 +151,8 @@ def _is_collection(value: object, origin: type, parts: tuple[Any, ...]) -> bool:
         return isinstance(value, origin | np.ndarray) and not isinstance(value, str)
     if origin is tuple and Ellipsis not in parts:
         return len(value) == len(parts) and all(map(_fits, value, parts))
+    if parts[0] is str and set(map(type, value)) <= {str}:  # a label for each of many samples
+        return True
     return all(_fits(one, parts[0]) for one in value)
 
 

@@ -60,6 +60,12 @@ class Ease(Enum):
             case Ease.HOLD:
                 return (0.0 if s < 1.0 else 1.0), 0.0, 0.0
 
+    def ways(self, s: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+        """Progress at many s."""
+        if self is Ease.HOLD:
+            return np.where(s < 1.0, 0.0, 1.0)
+        return self.progress(s)[0]  # type: ignore[return-value, arg-type]  # all of them polynomials
+
 
 @dataclass(frozen=True, slots=True)
 class Curve:

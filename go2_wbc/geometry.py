@@ -41,14 +41,13 @@ def support_margins(
     if len(points) == 0:
         raise ValueError("a support polygon needs at least one point")
     hull = convex_hull(points)
+    distance, is_inside = np.full(len(p), np.inf), np.full(len(p), len(hull) >= 3)
     edges = np.roll(hull, -1, axis=0) - hull
-    squares = np.maximum((edges**2).sum(axis=1), _TINY)
-    offsets = p[:, None] - hull
-    along = (offsets * edges).sum(axis=2) / squares
-    nearest = hull + np.clip(along, 0.0, 1.0)[:, :, None] * edges
-    distance = np.linalg.norm(p[:, None] - nearest, axis=2).min(axis=1)
-    turns = edges[:, 0] * offsets[:, :, 1] - edges[:, 1] * offsets[:, :, 0]
-    is_inside = (turns >= 0.0).all(axis=1) & (len(hull) >= 3)
+    for (x, y), (ex, ey) in zip(hull.tolist(), edges.tolist(), strict=True):
+        dx, dy = p[:, 0] - x, p[:, 1] - y
+        along = np.clip((dx * ex + dy * ey) / max(ex * ex + ey * ey, _TINY), 0.0, 1.0)
+        np.minimum(distance, np.hypot(dx - along * ex, dy - along * ey), out=distance)
+        is_inside &= ex * dy - ey * dx >= 0.0
     return np.where(is_inside, distance, -distance)
 
 

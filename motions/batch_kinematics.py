@@ -22,6 +22,7 @@ from go2_wbc.robot.leg_kinematics import (
 )
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import quaternions_from_rpy, rotations_from_rpy
+from motions.memory import Memory, Rows, by_rows
 
 LEAST_WEIGHT = 1.0
 """Least vertical force [N] by which moments are divided: the zero-moment point stays finite."""
@@ -51,31 +52,39 @@ class Placed:
     """(n, 4) distance [m] by which such a foot is out of its leg's reach."""
 
 
-def place(wanted: Wanted, steps: int, model: RobotModel) -> Placed:
+def place(wanted: Wanted, steps: int, model: RobotModel, memory: Memory | None = None) -> Placed:
     """Trunk and joints that give what is wanted; ``steps`` put the CoM in its place.
 
     With the feet in their places and the attitude given, the CoM c is a function of the base's
     place p alone; p <- p + (c* - c(p)) converges, since the legs follow the base only in part: each
     step leaves an eighth of the error (measured). The legs are solved once more after the last one,
-    so that the feet are exactly in their places.
+    so that the feet are exactly in their places. ``memory``: of instants that are like these.
     """
-    p, joints = _own(wanted.p), _own(wanted.q_joints)
-    miss, com = np.empty((len(p), 4)), np.empty((len(p), 3))
-    settle(
-        _own(wanted.p),
-        _own(wanted.is_com),
-        _own(wanted.raised),
-        _own(wanted.R),
-        _own(wanted.p_feet),
-        leg_table(model),
-        link_table(model),
-        steps,
-        p,
-        joints,
-        miss,
-        com,
-    )
-    return Placed(p, joints, com, miss)
+
+    def work(rows: Rows) -> Float[np.ndarray, "k 22"]:
+        p, joints = wanted.p[rows], wanted.q_joints[rows]
+        miss, com = np.empty((len(p), 4)), np.empty((len(p), 3))
+        settle(
+            p.copy(),
+            wanted.is_com[rows],
+            wanted.raised[rows],
+            wanted.R[rows],
+            wanted.p_feet[rows],
+            leg_table(model),
+            link_table(model),
+            steps,
+            p,
+            joints,
+            miss,
+            com,
+        )
+        return np.hstack([p, joints, com, miss])
+
+    count = len(wanted.p)
+    given = [wanted.p, wanted.R.reshape(count, 9), wanted.p_feet.reshape(count, 12)]
+    given += [wanted.q_joints, wanted.is_com[:, None], wanted.raised]
+    found = by_rows(memory, ("place", steps), np.hstack(given), work)
+    return Placed(found[:, :3], found[:, 3:15], found[:, 15:18], found[:, 18:])
 
 
 def attitudes(rpy: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3 3"]:

@@ -40,6 +40,7 @@ class LivePreview:
 
     Attributes:
         url: of the page.
+        process_id: of the program.
     """
 
     def __init__(self, *arguments: str, command: str = "preview", folder: Path = ROOT) -> None:
@@ -52,6 +53,7 @@ class LivePreview:
             env={**os.environ, "PYTHONPATH": str(ROOT)},
             preexec_fn=_hear_ctrl_c,
         )
+        self.process_id = self._process.pid
         self.url: str = self.heard()["url"]
 
     def heard(self) -> dict[str, Any]:

@@ -46,6 +46,8 @@ class Bar:
     parts: tuple[str, ...]  #: what it moves: legs, "trunk", "robot" or "time"
     broken: str  #: the first limit that is broken there, in words; empty if none is
     slots: tuple[Slot, ...]  #: the arguments that are written in it
+    values: Mapping[str, float | str]  #: of its arguments, as it ran; angles in radians
+    callers: tuple[tuple[tuple[int, int], int], ...] = ()  #: see ``motions.language.tracing``
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +57,8 @@ class Answer:
     title: str  #: name of the motion
     content: ReplayContent | None = None  #: the plan with its verdict, and how it was played
     bars: tuple[Bar, ...] = ()  #: by their starts
+    motions: tuple[str, ...] = ()  #: all that the file defines
     told: str = ""  #: how playing went, in words
+    notes: tuple[str, ...] = ()  #: what is to be known of the file, in words
     changes: tuple[tuple[str, str], ...] = ()
     """Calls that make it possible, to be appended to the motion, each with its meaning."""

@@ -11,14 +11,18 @@ from pathlib import Path
 from typing import final
 
 import viz
-from controller.studio.edits import PALETTE, edited
+from controller.studio.edits import PALETTE, edited, run_of, site_of
 from controller.studio.orders import Answer, Bar, Order, Task
 from controller.studio.project import Project
+from controller.studio.rewriting import offers
 from controller.studio.running import Runner
+from controller.studio.songs import heard, songs_beside
 from controller.studio.source import Source, parameters
+from controller.studio.together import copied, edited_together, pasted
 from go2_wbc.curves import Ease
 from go2_wbc.errors import Go2WbcError, StudioError, unknown_name
 from go2_wbc.legs import LEGS
+from go2_wbc.motion_plan import Posture
 from motions.authoring import Value
 from motions.language.body_and_feet import POSES
 from motions.language.steps import STEP_GAITS
@@ -35,6 +39,7 @@ WORDS: Mapping[str, Sequence[str]] = {
     "gait": list(STEP_GAITS),
     "pose.name": list(POSES),
     "joint": ["hip", "thigh", "calf"],
+    "posture.stance": [posture.name for posture in Posture],
 }
 """Words that arguments may be, of all calls or of one; others can be written in the file."""
 
@@ -64,6 +69,9 @@ class Studio:
         self._lock, self.motion = threading.RLock(), motion
         self._runner, self._player = Runner(), Runner()
         self._changes: tuple[str, ...] = ()
+        self._copied: tuple[str, ...] = ()
+        self._motions: tuple[str, ...] = ()
+        self._bars: tuple[Bar, ...] = ()
         try:
             shown = self._run(self._project.saved)
             self.motion = shown.title
@@ -76,6 +84,9 @@ class Studio:
                 token=token,
                 actions={
                     "/edit": self.edit,
+                    "/copy": self.copy,
+                    "/choose": self.choose,
+                    "/music": self.music,
                     "/play": self.play,
                     "/mend": self.mend,
                     "/export": self.export,
@@ -90,8 +101,10 @@ class Studio:
         """Do what a page asks for.
 
         Args:
-            order: see ``edited``; besides ``op`` "undo" and "redo". ``base`` is the state of the
-                file that the page knows, ``commit`` whether to save.
+            order: see ``edited_together``; besides ``op`` "undo" and "redo", "change" (see
+                ``mend``), "offers" (what there is to be done for a bar, by ``site`` and ``number``)
+                and "paste" behind ``site`` what ``copy`` has taken. ``base`` is the
+                state of the file that the page knows, ``commit`` whether to save.
 
         Returns:
             What the page shows next, packed, and of what was saved the ``site`` of the call that
@@ -103,6 +116,10 @@ class Studio:
                     self.show()
                 if order.get("op") not in HISTORY and order.get("base") != self._base:
                     raise StudioError("the file was saved elsewhere: this is what it says now")
+                if order.get("op") == "offers":
+                    place = site_of(order.get("site")), run_of(self._with_callers(order))
+                    source = Source(self._project.saved)
+                    return {"offers": offers(source, self.motion or "", *place)}
                 return self._done(order)
             except StudioError as error:
                 return {"error": str(error)}
@@ -117,18 +134,59 @@ class Studio:
         shown = self._run(data)  # what is no motion is not saved
         if order.get("commit") is True:
             self._project.save(data)
+            self._bars = shown.bars
             self._server.publish(self._content(shown))
             return site
-        return {"data": content_text(self._content(shown), shown.title)}
+        return {"data": content_text(self._content(shown), shown.title, is_brief=True)}
 
     def _edited(self, order: Mapping[str, object]) -> Source:
         source = Source(self._project.saved)
+        if order.get("op") == "paste":
+            return pasted(source, order, self._copied)
         if order.get("op") != "change":
-            return edited(source, order)
+            motion = self.motion or ""
+            return edited_together(
+                source, order, lambda text, one: edited(text, self._with_callers(one), motion)
+            )
         which = order.get("which")
         if type(which) is not int or not 0 <= which < len(self._changes):
             raise StudioError("a change is one of those that were proposed")
         return source.append(self.motion or "", self._changes[which])
+
+    def copy(self, order: Mapping[str, object]) -> dict[str, object]:
+        """Keep the calls that end in ``sites``, to be pasted into any motion of the file."""
+        with self._lock:
+            try:
+                self._copied = copied(Source(self._project.saved), order)
+            except StudioError as error:
+                return {"error": str(error)}
+        count = len(self._copied)
+        return {"told": f"copied {count} {'moves' if count > 1 else 'move'}"}
+
+    def choose(self, order: Mapping[str, object]) -> dict[str, object]:
+        """Show another motion of the file: ``motion`` is its name."""
+        with self._lock:
+            before, name = self.motion, order.get("motion")
+            if not isinstance(name, str) or name not in self._motions:
+                return {"error": unknown_name("motion", str(name), self._motions)}
+            self.motion, self._values = name, {}
+            try:
+                self._server.publish(self._content(self._run(self._project.saved)), name)
+            except StudioError as error:
+                self.motion = before
+                return {"error": str(error)}
+        return {}
+
+    def music(self, order: Mapping[str, object]) -> dict[str, object]:
+        """The beats and the sound of ``name``, one of the sound files beside the motion's."""
+        path, name = self._project.path, order.get("name")
+        songs = songs_beside(path)
+        if not isinstance(name, str) or name not in songs:
+            return {"error": unknown_name("song", str(name), songs)}
+        try:
+            return heard(path.with_name(name))
+        except Go2WbcError as error:
+            return {"error": str(error)}
 
     def play(self, _: Mapping[str, object]) -> dict[str, object]:
         """The motion as it is saved, in MuJoCo beside the plan; or why it could not be played."""
@@ -210,20 +268,36 @@ class Studio:
 
     def _run(self, data: bytes, task: Task = Task.CHECK) -> Answer:
         order = Order(self._project.path, data, self.motion, self._values, task)
-        return (self._runner if task is Task.CHECK else self._player).run(order)
+        answer = (self._runner if task is Task.CHECK else self._player).run(order)
+        if data == self._project.saved and answer.bars:
+            self._bars = answer.bars
+        return answer
+
+    def _with_callers(self, order: Mapping[str, object]) -> Mapping[str, object]:
+        """The order with the calls of helpers that the bar which it means runs in."""
+        meant = order.get("site"), order.get("number") or 0
+        for bar in self._bars:
+            if (list(bar.site), bar.number) == meant:
+                return {"callers": bar.callers, **order}
+        return order
 
     def _content(self, shown: Answer) -> ReplayContent:
         bars = [_bar(bar) for bar in shown.bars]
         editor = {
             "bars": bars,
             "file": self._project.path.name,
+            "motion": shown.title,
+            "motions": shown.motions,
             "base": self._base,
             "undo": self._project.can_undo,
             "redo": self._project.can_redo,
             "palette": list(PALETTE),
+            "songs": songs_beside(self._project.path),
+            "notes": shown.notes,
             "words": WORDS,
             "lanes": ["trunk", *(leg.name for leg in LEGS), "robot", "time"],
         }
+        self._motions = shown.motions
         if shown.content is None:
             raise StudioError("there is nothing to show")
         return replace(shown.content, editor=editor)
@@ -231,6 +305,6 @@ class Studio:
 
 def _bar(bar: Bar) -> dict[str, object]:
     """A bar as the page needs it, with the arguments that could be added."""
-    given = {slot.name for slot in bar.slots}
+    given = {slot.of for slot in bar.slots}
     more = [name for name in parameters(bar.name) if name not in given]
     return {**asdict(bar), "more": more}

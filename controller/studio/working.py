@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import replace
+from enum import Enum
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING
 
+from controller.studio.literals import Run
 from controller.studio.orders import Answer, Bar, Order, Task
 from controller.studio.source import Source
 from go2_wbc.errors import Go2WbcError, StudioError
-from go2_wbc.legs import LEGS
+from go2_wbc.legs import LEGS, Leg
 
 if TYPE_CHECKING:
+    from controller.studio.making import Maker
     from motions import CheckedMotion, FeasibilityChecker
     from motions.language.tracing import CallMark
     from viz.content import ReplayContent
@@ -24,29 +27,28 @@ def serve(pipe: Connection) -> None:
     """Answer orders: a word once the robot is loaded, one when the file has run, and the answer."""
     with suppress(EOFError, KeyboardInterrupt):
         order: Order = pipe.recv()
+        from controller.studio.making import Maker
         from motions import FeasibilityChecker
+        from motions.memory import Memory
 
-        checker = FeasibilityChecker()
+        checker = FeasibilityChecker(memory=Memory())  # most of a motion is as it was
+        maker = Maker()
         pipe.send("loaded")
         while True:
-            pipe.send(_answer(order, checker, pipe))
+            pipe.send(_answer(order, checker, maker, pipe))
             order = pipe.recv()
 
 
-def _answer(order: Order, checker: FeasibilityChecker, pipe: Connection) -> Answer | StudioError:
+def _answer(
+    order: Order, checker: FeasibilityChecker, maker: Maker, pipe: Connection
+) -> Answer | StudioError:
     from controller.report_view import planned, slider
     from motions import suggest
-    from motions.language.tracing import separated, traced
-    from motions.registry import load_text
 
     has_run = False
     try:
-        with traced():
-            own = load_text(order.path, order.data)
-            motion = own.get(order.chosen or "", next(iter(own.values())))
-            known = {item.name: item for item in motion.parameters}
-            values = {name: value for name, value in order.values.items() if name in known}
-            line, marks = separated(motion(**values))
+        made = maker.make(order)
+        motion, values, line = made.motion, made.values, made.line
         pipe.send("made")
         has_run = True
         if order.task is Task.MEND:
@@ -64,8 +66,9 @@ def _answer(order: Order, checker: FeasibilityChecker, pipe: Connection) -> Answ
         is_ours = isinstance(error, Go2WbcError)
         return StudioError(str(error) if is_ours else "the file ends the program")
     sliders = tuple(slider(item, values.get(item.name, item.default)) for item in motion.parameters)
-    bars = tuple(_bars(Source(order.data), str(order.path), marks, content))
-    return Answer(motion.name, replace(content, sliders=sliders), bars, told)
+    bars = tuple(_bars(Source(order.data), str(order.path), made.marks, content))
+    content = replace(content, sliders=sliders)
+    return Answer(motion.name, content, bars, made.names, told, made.notes)
 
 
 def _played(checked: CheckedMotion, checker: FeasibilityChecker) -> tuple[ReplayContent, str]:
@@ -107,8 +110,21 @@ def _bars(
             (mark.start, max(mark.move, mark.start), mark.end),
             parts,
             _broken(content, mark.start, mark.end, parts),
-            tuple(source.slots(call.site, call.number)) if is_here else (),
+            tuple(source.slots(call.site, Run(call.number, call.callers))) if is_here else (),
+            dict(_values(call.arguments)),
+            call.callers,
         )
+
+
+def _values(arguments: Mapping[str, object]) -> Iterator[tuple[str, float | str]]:
+    """Those that are numbers or words."""
+    for name, value in arguments.items():
+        if isinstance(value, Leg):
+            yield name, value.name
+        elif isinstance(value, Enum):
+            yield name, str(value.value)
+        elif isinstance(value, int | float | str) and not isinstance(value, bool):
+            yield name, value
 
 
 def _broken(content: ReplayContent, start: float, end: float, parts: Sequence[str]) -> str:

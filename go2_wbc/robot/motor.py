@@ -40,7 +40,7 @@ gets none.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, cast
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -53,9 +53,11 @@ from go2_wbc.records import Array12, Array18, ArrayNx12, packed
 from go2_wbc.robot.description import RobotDescription
 from go2_wbc.robot.state import JointCommand, Snapshot
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
+from go2_wbc.written import Written
 
 PerJoint = Annotated[tuple[float, ...], len(JOINT_NAMES)]
 """A number for each joint, in the order of ``JOINT_NAMES``."""
+PerJoints = Float[np.ndarray, "*n 12"]  #: The same at one instant or at many
 TORQUE_SPEED, IDEAL = "torque-speed", "ideal"
 MOTORS = (TORQUE_SPEED, IDEAL)
 """Names of the models: with the torque-speed line, and with the peak torque at every speed."""
@@ -250,12 +252,12 @@ class JointFriction:
         """The same for every leg: of hip, thigh and calf."""
         return JointFriction(dry=dry * 4, viscous=viscous * 4)
 
-    def torque(self, v: Array12, a: Array12) -> Array12:
+    def torque(self, v: PerJoints, a: PerJoints) -> PerJoints:
         """What friction takes [N m] at joint speeds ``v`` [rad/s] and accelerations ``a`` to come.
 
-        ``a`` is in rad/s^2.
+        ``a`` is in rad/s^2; of one instant or of many.
         """
-        return np.array([friction_torque(self, n, v[n], a[n]) for n in range(12)])
+        return np.asarray(cast("Written", friction_torque).written(self, slice(None), v, a))
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,6 +42,7 @@ from go2_wbc.robot.model import RobotModel
 from motions.batch_kinematics import attitudes
 from motions.feasibility.forces import Case
 from motions.feasibility.report import Series
+from motions.memory import Rows, by_rows
 from motions.plan.trajectory import Trajectory
 
 STRIDE = 4
@@ -80,19 +81,24 @@ class SelfCollision:
 
     def nearest(self, q: Float[np.ndarray, "19"]) -> tuple[float, str]:
         """Least distance [m] of any pair, negative if they overlap, and the pair's name."""
-        return self.nearest_along(q[None])[0]
+        ((distance, pair),) = self.nearest_along(q[None])
+        return distance, self.pair_name(pair)
 
-    def nearest_along(self, q: Float[np.ndarray, "n 19"]) -> list[tuple[float, str]]:
-        """What ``nearest`` says of each configuration; faster if they follow one another."""
+    def nearest_along(self, q: Float[np.ndarray, "n 19"]) -> list[tuple[float, int]]:
+        """What ``nearest`` says of each configuration, by the numbers of pairs.
+
+        Faster if they follow one another.
+        """
         joints, found = q[:, 7:], []
         last, seen = np.full(len(self.names), -np.inf), np.zeros_like(self.levers)
+        nearest = 0
         for row in range(len(q)):
             pin.updateGeometryPlacements(
                 self._model, self._data, self.geometry, self._results, q[row]
             )
-            bounds = last - (self.levers * np.abs(joints[row] - seen)).sum(axis=1)
-            likely = int(np.argmin(bounds))
-            least, nearest = self._distance(likely), likely
+            moved = np.einsum("ij,ij->i", self.levers, np.abs(joints[row] - seen))
+            bounds, likely = last - moved, nearest  # where nothing moves far it stays so
+            least = self._distance(likely)
             last[likely], seen[likely] = least, joints[row]
             for pair in np.flatnonzero(bounds <= least + SLACK).tolist():
                 if pair == likely or bounds[pair] > least + SLACK:
@@ -101,13 +107,14 @@ class SelfCollision:
                 last[pair], seen[pair] = distance, joints[row]
                 if (distance, pair) < (least, nearest):
                     least, nearest = distance, pair
-            found.append((least, self._name(nearest)))
+            found.append((least, nearest))
         return found
 
     def _distance(self, pair: int) -> float:
         return float(pin.computeDistance(self.geometry, self._results, pair).min_distance)
 
-    def _name(self, pair: int) -> str:
+    def pair_name(self, pair: int) -> str:
+        """The two bodies of a pair."""
         first, second = (name.rsplit("_", 1)[0] for name in self.names[pair])
         return f"{first}-{second}"
 
@@ -117,9 +124,13 @@ def self_distance(case: Case, collision: SelfCollision) -> Series:
     rows, model = slice(None, None, STRIDE), case.model
     q = case.path.q[rows].copy()
     q[:, 7:] = np.clip(q[:, 7:], model.q_lower, model.q_upper)
-    found = collision.nearest_along(q)
-    values = np.array([[distance] for distance, _ in found])
-    worst = found[int(np.argmin(values))][1]
+
+    def nearest(rows: Rows) -> Float[np.ndarray, "k 2"]:
+        return np.array(collision.nearest_along(q[rows]))
+
+    found = by_rows(case.memory, "collision", q[:, 7:], nearest)
+    values = found[:, :1]
+    worst = collision.pair_name(int(found[np.argmin(values), 1]))
     what, times = ("self-collision", "m", (worst,), values), case.path.times[rows]
     return case.series(*what, case.limits.self_distance, is_floor=True, times=times)
 
@@ -200,9 +211,9 @@ class LinkHull:
             up: the world's vertical in the joint's frame.
             height: of the joint [m].
         """
-        lowest = height + (up @ self.box.T).min(axis=1)
+        lowest = height + (self.box @ up.T).min(axis=0)
         near = lowest < FAR
-        lowest[near] = height[near] + (up[near] @ self.corners.T).min(axis=1)
+        lowest[near] = height[near] + (self.corners @ up[near].T).min(axis=0)
         return lowest
 
 

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from go2_wbc.arguments import typed
 from go2_wbc.brief import brief, inline_html
@@ -31,6 +31,7 @@ from motions.feasibility.goal_errors import departure_measurements, departures
 from motions.feasibility.report import FeasibilityReport, Series
 from motions.language.timeline import Timeline
 from motions.language.timeline_data import NEAREST
+from motions.memory import Memory
 from motions.plan.compiled_plan import LEAST_FEET, CompiledPlan, Problem
 from motions.plan.timeline_compiler import Broken, compile_timeline
 from motions.plan.trajectory import Trajectory, trajectory_of
@@ -80,10 +81,7 @@ class CheckedMotion:
             stance=path.stance,
             p_world_com=path.p_com,
             support_margin=np.where(has_area, support.values[:, 0], np.nan),
-            labels=tuple(
-                _label(float(t), stands, spans)
-                for t, stands in zip(path.times, path.stance, strict=True)
-            ),
+            labels=_labels(path, spans),
             robot=self.robot,
         )
 
@@ -93,20 +91,21 @@ Playable = str | Path | Motion | Timeline | MotionPlan | CheckedMotion
 (with its default parameters), a timeline, a plan, or a motion that was checked before."""
 
 
-@typed("model", "mend", "progress")
+@typed("model", "mend", "progress", "memory")
 def compile_motion(
     motion: object,
     model: RobotModel,
     *,
     mend: Broken | None = None,
     progress: Progress | None = None,
+    memory: Memory | None = None,
 ) -> MotionPlan:
     """The plan of ``motion`` on the robot ``model``; what is compiled already is not done again.
 
     Args:
         motion: a ``Playable``; anything else is refused.
         model: must not be that of a control loop that runs in another thread.
-        mend, progress: as for ``compile_timeline``; ``mend`` is asked for timelines with
+        mend, progress, memory: as for ``compile_timeline``; ``mend`` is asked for timelines with
             ``physics="nearest"`` only.
 
     Raises:
@@ -127,7 +126,7 @@ def compile_motion(
             f"a plan or a CheckedMotion, got {motion!r}"
         )
     asked = mend if line.physics == NEAREST else None
-    return compile_timeline(line, model, mend=asked, progress=progress)
+    return compile_timeline(line, model, mend=asked, progress=progress, memory=memory)
 
 
 def timeline_of(motion: object, profile: RobotProfile | None = None) -> Timeline | None:
@@ -164,16 +163,19 @@ class FeasibilityChecker:
         *,
         world: World | None = None,
         progress: Progress | None = None,
+        memory: Memory | None = None,
     ) -> None:
         """Prepare for ``model``, by default the installed Go2, in ``world``.
 
         What is uncertain in it counts at its worst. Plans are made for ``model`` as it is: like the
         controller, they know nothing of a payload. ``progress`` is called while a dynamic motion is
-        solved, with the number of iterations and the cost.
+        solved, with the number of iterations and the cost. With a ``memory`` of its own, what a
+        motion has in common with those that were checked before is not worked out again: for an
+        editor.
         """
         self.model = model or RobotModel()
         self.world = world or World()
-        self._progress = progress
+        self._progress, self._memory = progress, memory
         self._limits = limits or FeasibilityLimits()
         self._loaded = _loaded(self.model, self.world.worst)
         self._collision = SelfCollision(self.model)
@@ -220,7 +222,9 @@ class FeasibilityChecker:
 
     def _compiled(self, motion: object) -> MotionPlan:
         """The plan of ``motion``, the nearest feasible one where its timeline asks for that."""
-        return compile_motion(motion, self.model, mend=self._broken, progress=self._progress)
+        return compile_motion(
+            motion, self.model, mend=self._broken, progress=self._progress, memory=self._memory
+        )
 
     def _broken(self, plan: CompiledPlan) -> Float[np.ndarray, " k"]:
         """Instants [s] at which ``plan`` breaks a limit."""
@@ -249,8 +253,9 @@ class FeasibilityChecker:
         if isinstance(motion, CheckedMotion):
             return motion
         plan, model, heavy = self._compiled(motion), self.model, self._loaded
-        world, limits, path = self.world.worst, self._limits, trajectory_of(plan, model)
-        forces = dynamics.forces_of(path, heavy)
+        world, limits, memory = self.world.worst, self._limits, self._memory
+        path = trajectory_of(plan, model, memory)
+        forces = dynamics.forces_of(path, heavy, memory)
         whole = plan if isinstance(plan, CompiledPlan) else None
         solved = whole if whole is not None and whole.dynamic else None
         if solved is not None:
@@ -259,7 +264,7 @@ class FeasibilityChecker:
         report = FeasibilityReport.of(
             plan.name,
             plan.duration,
-            self._judged(Case(path, forces, model, heavy, world, limits), plan),
+            self._judged(Case(path, forces, model, heavy, world, limits, memory), plan),
             None if whole is None else whole.end_pose,
             departures=() if solved is None else departures(solved, model),
             world=self.world,
@@ -377,13 +382,18 @@ def _with_load(motion: Trajectory, heavy: RobotModel) -> Trajectory:
     return replace(motion, p_com=centres_of_mass(poses, motion.q[:, 7:], heavy))
 
 
-def _label(
-    time: float, stance: Bool[np.ndarray, "4"], spans: Mapping[str, tuple[float, float]]
-) -> str:
-    for name, (start, end) in spans.items():
-        if start <= time < end:
-            return name
-    raised = [leg.name for leg in LEGS if not stance[leg]]
+def _labels(path: Trajectory, spans: Mapping[str, tuple[float, float]]) -> tuple[str, ...]:
+    of_modes = [_label(mode) for mode in range(2 ** len(LEGS))]
+    labels = [of_modes[mode] for mode in (path.stance @ [1, 2, 4, 8]).tolist()]
+    for name, (start, end) in reversed(list(spans.items())):  # the first one counts
+        first, last = np.searchsorted(path.times, [start, end]).tolist()
+        labels[first:last] = [name] * (last - first)
+    return tuple(labels)
+
+
+def _label(stance: int) -> str:
+    """Of feet that stand by the bits of a number."""
+    raised = [leg.name for leg in LEGS if not stance >> leg & 1]
     if len(raised) == 4:
         return "flight"
     return f"{' and '.join(raised)} up" if raised else "on four feet"

@@ -37,7 +37,7 @@ speed dJ/dt v / b, and as the plan's feet rest, dJ/dt v = -J a. Fast rocking mak
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -61,8 +61,9 @@ from go2_wbc.wbc.trajectory_loads import (
     slide,
 )
 from go2_wbc.world import World
-from motions.batch_kinematics import attitudes, turned, zero_moment_points
+from motions.batch_kinematics import attitudes, foot_centres, turned, zero_moment_points
 from motions.feasibility.report import Series
+from motions.memory import Memory, Rows, by_rows
 from motions.plan.trajectory import Trajectory
 from motions.postures import NORMAL_FORCE_MAX
 
@@ -98,6 +99,15 @@ class Case:
     heavy: RobotModel  #: the robot that does it, with the load of the world
     world: World = World()  #: with the worst of what is uncertain
     limits: FeasibilityLimits = FeasibilityLimits()  #: what must be kept
+    memory: Memory | None = None  #: of movements that are like it
+    places: Float[np.ndarray, "n 4 3"] = field(init=False)
+    """(n, 4, 3) where the feet's centres are [m], in the frame of the motion."""
+
+    def __post_init__(self) -> None:
+        """Place the feet."""
+        q, R = self.path.q, attitudes(self.path.rpy)
+        places = foot_centres(q[:, :3], R, q[:, 7:], self.model)
+        object.__setattr__(self, "places", places)
 
     def series(
         self,
@@ -139,7 +149,9 @@ LOADED = 0.999  #: Share of its load from which on a foot counts as standing ful
 PRESSED = 10.0
 """Normal force [N] from which on the friction of a foot matters; below, the quotient is noise and
 a slip moves nothing (own choice, 6 % of the weight)."""
-STILL = 1e-6  #: Joint speed [rad/s] below which a motor drives nothing: more than rounding, 1e-15
+STILL = 1e-5
+"""Joint speed [rad/s] below which a motor drives nothing: more than what splines ring by at rest,
+2e-6."""
 NO_SUPPORT = 1.0
 """How far outside [m] of their support CoM and zero-moment point count when no foot stands."""
 _FEW = (2, 3)
@@ -162,21 +174,33 @@ CONTACT_RATE = 145.0
 more, as trunks lag their plan. Own choice, seen on motions that judge nothing."""
 SETTLED = 0.1
 """Time [s] after a touchdown, and before a lift-off, in which a foot without load may skid."""
+NEARBY = np.array([-2.0, 2.0]) * SETTLED  #: Times that hold all of these
 
 
-def forces_of(motion: Trajectory, model: RobotModel) -> Forces:
-    """Contact forces and torques along ``motion``."""
-    rows = zip(motion.q, motion.v, motion.a, strict=True)
-    needed = _spread(np.array([model.inverse_dynamics(*row) for row in rows]), motion)
-    contact, tau = np.zeros((len(needed), 4, 3)), needed[:, 6:].copy()
-    missing = np.empty((len(needed), 2))
-    joints, load_share = (np.array(a, order="C") for a in (motion.q[:, 7:], motion.load_share))
-    given = (joints, attitudes(motion.rpy), needed[:, :6].copy(), load_share)
-    scale = weights_of(motion, model)
+def forces_of(motion: Trajectory, model: RobotModel, memory: Memory | None = None) -> Forces:
+    """Contact forces and torques along ``motion``; ``memory``: of motions that are like it."""
+
+    def dynamics(rows: Rows) -> Float[np.ndarray, "k 18"]:
+        states = zip(motion.q[rows], motion.v[rows], motion.a[rows], strict=True)
+        return np.array([model.inverse_dynamics(*state) for state in states])
+
+    given = np.hstack([motion.q[:, 3:], motion.v, motion.a])  # it is the same everywhere
+    needed = _spread(by_rows(memory, "dynamics", given, dynamics), motion)
+    scale, R = weights_of(motion, model), attitudes(motion.rpy)
     tables = (leg_table(model), friction_pyramid(PYRAMID), scale, numbers_of(model))
-    share_loads(*given, *tables, contact, tau, missing)
-    wrench = given[2]
-    return Forces(contact, tau, missing, zero_moment_points(motion.q, motion.rpy, wrench), wrench)
+
+    def loads(rows: Rows) -> Float[np.ndarray, "k 26"]:
+        contact, missing = np.zeros((len(rows), 4, 3)), np.empty((len(rows), 2))
+        joints, load_share, tau = motion.q[rows, 7:], motion.load_share[rows], needed[rows, 6:]
+        own = (joints, R[rows], needed[rows, :6], load_share)
+        share_loads(*own, *tables, contact, tau, missing)
+        return np.hstack([contact.reshape(-1, 12), tau, missing])
+
+    given = np.hstack([motion.q[:, 7:], motion.rpy, needed, motion.load_share])
+    shared = by_rows(memory, ("loads", *np.round(scale, 9)), given, loads)
+    contact, wrench = shared[:, :12].reshape(-1, 4, 3), needed[:, :6].copy()
+    zmp = zero_moment_points(motion.q, motion.rpy, wrench)
+    return Forces(contact, shared[:, 12:24], shared[:, 24:], zmp, wrench)
 
 
 def _spread(needed: Float[np.ndarray, "n 18"], motion: Trajectory) -> Float[np.ndarray, "n 18"]:
@@ -300,8 +324,9 @@ def lost(case: Case) -> Float[np.ndarray, "n 6"]:
     motion, forces = case.path, case.forces
     R, p = attitudes(motion.rpy), motion.q[:, :3]
     arms = motion.p_feet - [0.0, 0.0, case.heavy.foot_radius] - p[:, None]
-    force = turned(R, forces.wrench[:, :3]) - forces.contact.sum(axis=1)
-    moment = turned(R, forces.wrench[:, 3:]) - np.cross(arms, forces.contact).sum(axis=1)
+    force = turned(R, forces.wrench[:, :3]) - np.einsum("nij->nj", forces.contact)
+    moments = np.einsum("nij->nj", np.cross(arms, forces.contact))
+    moment = turned(R, forces.wrench[:, 3:]) - moments
     return np.hstack([force, moment]) / _inertia(motion, case.heavy)
 
 
@@ -349,12 +374,11 @@ def passes_over_few(motion: Trajectory, limits: FeasibilityLimits) -> Bool[np.nd
 
 
 def _same_support(motion: Trajectory) -> list[Int[np.ndarray, " k"]]:
-    """Samples in which the same feet, at least one, stand in the same places."""
-    places = np.where(motion.stance[:, :, None], motion.p_feet[:, :, :2], np.nan)
-    keys = np.nan_to_num(np.round(places.reshape(-1, 8), 6), nan=np.inf)
-    _, group = np.unique(keys, axis=0, return_inverse=True)
-    ordered = np.argsort(group, kind="stable")
-    groups = np.split(ordered, np.flatnonzero(np.diff(group[ordered])) + 1)
+    """Samples, one after the other, in which the same feet stand in the same places."""
+    places = np.where(motion.stance[:, :, None], motion.p_feet[:, :, :2], np.inf).reshape(-1, 8)
+    keys = np.round(places, 6)
+    changes = np.flatnonzero((keys[1:] != keys[:-1]).any(axis=1)) + 1
+    groups = np.split(np.arange(len(keys)), changes)
     return [rows for rows in groups if motion.stance[rows[0]].any()]
 
 
@@ -421,16 +445,23 @@ def _least_friction(case: Case) -> Float[np.ndarray, " n"]:
     highest = np.where(missing <= case.limits.wrench, values, MOST_FRICTION)
     is_far = highest < NEAR_LIMIT * case.world.friction
     highest[is_far | motion.is_dynamic] = 0.0
-    joints, load_share = (np.array(a, order="C") for a in (motion.q[:, 7:], motion.load_share))
-    given = (joints, attitudes(motion.rpy), forces.wrench, load_share, leg_table(model), cone())
-    what = (scale_of_wrench(), numbers_of(model), highest, case.limits.wrench)
-    least_friction(*given, *what, values)
-    return values
+    R, tables = attitudes(motion.rpy), (leg_table(model), cone(), scale_of_wrench())
+
+    def least(rows: Rows) -> Float[np.ndarray, "k 1"]:
+        found, most, limit = values[rows], highest[rows], case.limits.wrench
+        own = (motion.q[rows, 7:], R[rows], forces.wrench[rows], motion.load_share[rows])
+        least_friction(*own, *tables, numbers_of(model), most, limit, found)
+        return found[:, None]
+
+    asked = np.column_stack([values, highest])
+    given = [motion.q[:, 7:], motion.rpy, forces.wrench, motion.load_share, asked]
+    return by_rows(case.memory, "least friction", np.hstack(given), least)[:, 0]
 
 
 def _settled(motion: Trajectory) -> Bool[np.ndarray, "n 4"]:
     """Where feet stand, and have stood and will stand for ``SETTLED``; the motion's ends count."""
-    stands = motion.stance.copy()
+    stands, times = motion.stance.copy(), motion.times
     for edge, leg in np.argwhere(motion.stance[1:] != motion.stance[:-1]):
-        stands[np.abs(motion.times - motion.times[edge]) < SETTLED, leg] = False
+        near = slice(*np.searchsorted(times, times[edge] + NEARBY).tolist())
+        stands[near, leg] &= np.abs(times[near] - times[edge]) >= SETTLED
     return stands

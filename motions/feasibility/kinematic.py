@@ -17,7 +17,6 @@ from go2_wbc.reference import Anchor
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
-from motions.batch_kinematics import attitudes, foot_centres
 from motions.feasibility.bodies import LinkHulls
 from motions.feasibility.forces import FEET, JOINTS, Case
 from motions.feasibility.report import Series
@@ -124,7 +123,7 @@ def clearance(case: Case, hulls: LinkHulls) -> Series:
     integration.
     """
     motion, limits = case.path, case.limits
-    feet = _feet(case)[:, :, 2] - case.model.foot_radius
+    feet = case.places[:, :, 2] - case.model.foot_radius
     sunk = np.where(motion.stance | motion.is_dynamic[:, None], 0.0, np.minimum(feet, 0.0))
     links, count = hulls.heights(motion), len(hulls.links)
     lower = {"thigh": limits.thigh_clearance, "calf": limits.calf_clearance}
@@ -151,7 +150,7 @@ def dragging(case: Case) -> Series:
     and this check leave out, small as long as it bears nothing. From ``limits.rub`` on that is a
     warning. The way is summed for as long as the foot stays that low.
     """
-    motion, limits, places = case.path, case.limits, _feet(case)
+    motion, limits, places = case.path, case.limits, case.places
     rubs = (places[:, :, 2] - case.model.foot_radius < limits.drag_height) & ~motion.stance
     rubs &= ~motion.is_dynamic[:, None]
     steps = np.linalg.norm(np.diff(places[:, :, :2], axis=0), axis=2)
@@ -171,7 +170,7 @@ def landing(case: Case) -> tuple[Series, Series, Series]:
     touchdown is that between the last two samples in the air; a difference to the next one would
     reach to the foot that stands.
     """
-    motion, limits, places = case.path, case.limits, _feet(case)
+    motion, limits, places = case.path, case.limits, case.places
     stands, times = motion.stance, motion.times
     paces = np.linalg.norm(np.diff(places, axis=0), axis=2) / np.diff(times)[:, None]
     away, flat, speed = (np.full(stands.shape, np.nan) for _ in range(3))
@@ -182,9 +181,11 @@ def landing(case: Case) -> tuple[Series, Series, Series]:
         away[row, leg] = np.linalg.norm(places[row, leg] - motion.p_feet[standing, leg])
         speed[row, leg] = paces[max(row - 1, 0), leg] if lands else 0.0
         if lands:
+            last = np.flatnonzero(stands[: edge + 1, leg])
+            since = slice(int(last[-1]) if len(last) else 0, edge + 1)
             flat[row, leg] = _left_to_go(
-                places[: edge + 1, leg] - motion.p_feet[standing, leg],
-                stands[: edge + 1, leg],
+                places[since, leg] - motion.p_feet[standing, leg],
+                stands[since, leg],
                 FAST * (times[1] - times[0]),
             )
     return (
@@ -229,7 +230,7 @@ def ends(case: Case, plan: MotionPlan) -> Series:
     first instant on still stands then.
     """
     motion, model, limits = case.path, case.model, case.limits
-    home, places = home_poses(model), _feet(case)[0]
+    home, places = home_poses(model), case.places[0]
     names = tuple(f"{end} {what}" for end in ENDS for what in ("place", "attitude", "speed"))
     bounds = np.array([limits.stance_position, limits.stance_angle, limits.end_speed] * 2)
     values = []
@@ -253,9 +254,3 @@ def ends(case: Case, plan: MotionPlan) -> Series:
     end = plan.exit.value
     way = "home()" if plan.exit is plan.entry else f"posture({end!r})"
     return replace(series, note=f"it is to end in {end}: {way}")
-
-
-def _feet(case: Case) -> Float[np.ndarray, "n 4 3"]:
-    """Places [m] of the feet's centres in the frame of the motion."""
-    q, R = case.path.q, attitudes(case.path.rpy)
-    return foot_centres(q[:, :3], R, q[:, 7:], case.model)

@@ -28,9 +28,9 @@ from jaxtyping import Bool, Float, Int
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.config import WbcConfig
-from go2_wbc.world import World
 from motions.feasibility import forces
 from motions.feasibility.report import Series
+from motions.memory import Rows, by_rows
 from motions.plan.trajectory import Trajectory
 
 TRIPOD = 3  #: Standing feet, with one raised
@@ -45,27 +45,30 @@ def tracking(case: forces.Case) -> Series:
 
     In MuJoCo it was off by 1.05 to 1.3 times as much for friction (motions drawn for that alone).
     """
-    taken, damping = resistance(case.path, case.heavy, case.world)
+    taken, damping = resistance(case)
     errors = forces.errors_of(case.path, forces.lost(case) + taken, damping)
     most = np.array([case.limits.off, case.limits.off_angle])
     return case.series("tracking", "m, rad", forces.TRUNK, errors, most)
 
 
-def resistance(
-    motion: Trajectory, model: RobotModel, world: World
-) -> tuple[Float[np.ndarray, "n 6"], Float[np.ndarray, "6"]]:
+def resistance(case: forces.Case) -> tuple[Float[np.ndarray, "n 6"], Float[np.ndarray, "6"]]:
     """What the joints' friction takes of the trunk's acceleration [m/s^2, rad/s^2], and damps.
 
     Of the place along the axes of the motion, of the turning along those of the trunk. It is that
     at the speeds of the plan; a trunk that falls behind turns the joints less, so the viscous part
     damps its errors [1/s], on average over the motion.
     """
-    count = len(motion.times)
+    motion, world, count = case.path, case.world, len(case.path.times)
     rows = np.unique(np.append(np.arange(0, count, EVERY), count - 1))
     v, a = motion.v[rows, 6:], motion.a[rows, 6:]
-    fed = WbcConfig().joint_friction.torque
-    rest = forces.joint_friction(v, world) - [fed(*both) for both in zip(v, a, strict=True)]
-    taken, damped = _taken(motion, rows, rest, model)
+    rest = forces.joint_friction(v, world) - WbcConfig().joint_friction.torque(v, a)
+    asked = np.hstack([motion.q[rows, 3:], motion.stance[rows], rest])
+
+    def work(new: Rows) -> Float[np.ndarray, "k 12"]:
+        return np.hstack(_taken(motion, rows[new], rest[new], case.heavy))
+
+    both = by_rows(case.memory, "resistance", asked, work)
+    taken, damped = both[:, :6], both[:, 6:]
     columns = [np.interp(motion.times, motion.times[rows], column) for column in taken.T]
     return np.column_stack(columns), world.joint_friction * forces.VISCOUS * damped.mean(axis=0)
 

@@ -108,13 +108,14 @@ class Footing:
         """The centre [m] of one foot at increasing ``times``."""
         way = self._ways[leg]
         first, last = way.during(times, with_lead=False)
-        p_foot = np.tile(way.places[first], (len(times), 1))
-        for key, goal in self._steps[leg][first:last]:
-            begin, end = _rows(key, times, 0.0)
+        steps = self._steps[leg][first:last]
+        rows = [_rows(key, times, 0.0) for key, _ in steps]
+        done = np.searchsorted([end for _, end in rows], np.arange(len(times)), side="right")
+        p_foot = np.array(way.places[first : last + 1])[done]
+        for (key, goal), (begin, end) in zip(steps, rows, strict=True):
             u, here = _shares(key, times[begin:end], 0.0), p_foot[begin:end]
             here += _minimum_jerk(u)[:, None] * (goal - here)
             here[:, 2] += key.height * _ROUND * (u * (1.0 - u)) ** 3
-            p_foot[end:] += goal - p_foot[end:]
         return p_foot
 
     def frames(self, times: Times) -> Float[np.ndarray, "n 3"]:
@@ -122,15 +123,19 @@ class Footing:
 
         Every step moves it by minimum jerk; the yaw is continuous over increasing ``times``.
         """
-        p_feet = np.empty((len(times), 4, 2))
+        count = len(times)
+        p_feet = np.empty((count, 4, 2))
         for leg, way in self._ways.items():
             first, last = way.during(times, with_lead=True)
-            p_feet[:, leg] = way.sums[first]
-            for number, (key, _) in enumerate(self._steps[leg][first:last], first):
-                begin, end = _rows(key, times, key.lead)
+            steps, gone = self._steps[leg][first:last], np.zeros((count + 1, 2))
+            rows = [_rows(key, times, key.lead) for key, _ in steps]
+            gone[0] = way.sums[first]
+            for (_, end), move in zip(rows, way.moves[first:last], strict=True):
+                gone[end] += move
+            p_feet[:, leg] = np.cumsum(gone[:count], axis=0)
+            for (key, _), (begin, end), move in zip(steps, rows, way.moves[first:], strict=False):
                 share = _minimum_jerk(_shares(key, times[begin:end], key.lead))
-                p_feet[begin:end, leg] += share[:, None] * way.moves[number]
-                p_feet[end:, leg] += way.moves[number]
+                p_feet[begin:end, leg] += share[:, None] * move
         ahead = p_feet[:, :2].mean(axis=1) - p_feet[:, 2:].mean(axis=1)
         yaw = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
         return np.column_stack([p_feet.mean(axis=1), yaw])

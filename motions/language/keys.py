@@ -36,6 +36,10 @@ class OwnEase:
         value = 1.0 - self.function(1.0 - s) if self.is_reversed else self.function(s)
         return float(value), 0.0, 0.0
 
+    def ways(self, s: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+        """As ``Ease.ways``."""
+        return np.array([self.progress(value)[0] for value in s.tolist()])
+
 
 Easing = Ease | OwnEase  #: Checked ways to go
 EaseWord = Ease | OwnEase | str | Callable[[float], float]  #: What an author may write for one

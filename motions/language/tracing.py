@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import functools
 import sys
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass, replace
 from inspect import signature
 from itertools import islice
-from types import CodeType
+from types import CodeType, FrameType
 from typing import Any, ClassVar
 
 from go2_wbc.curves import Ease
@@ -39,6 +40,9 @@ class Call:
     site: tuple[int, int]  #: line from 1, column [bytes of UTF-8] from 0 at which it ends
     number: int  #: how often this call had run before
     arguments: dict[str, object]  #: those that were given, by the names of the parameters
+    callers: tuple[tuple[tuple[int, int], int], ...] = ()
+    """Where the calls of the functions of this file end that it runs in, the innermost first, and
+    how often they had run before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +79,17 @@ def traced() -> Iterator[None]:
         if callable(method) and not name.startswith("_")
     }
     runs, is_inside = Counter[tuple[str, tuple[int, int]]](), False
+    entered = defaultdict[tuple[str, tuple[int, int]], dict[FrameType, int]](dict)
+
+    def callers(frame: FrameType) -> Iterator[tuple[tuple[int, int], int]]:
+        file, outer = frame.f_code.co_filename, frame.f_back
+        while outer is not None:
+            if outer.f_code.co_filename == file:
+                site = _end_of(outer.f_code, outer.f_lasti)
+                known = entered[file, site]
+                yield site, known.setdefault(frame, len(known))
+                frame = outer
+            outer = outer.f_back
 
     def tracing(name: str, method: Callable[..., Any]) -> Callable[..., Timeline]:
         names = signature(method)
@@ -93,9 +108,11 @@ def traced() -> Iterator[None]:
             before = given.pop("self")
             frame = sys._getframe(1)
             place = (frame.f_code.co_filename, _end_of(frame.f_code, frame.f_lasti))
-            done = Call(name, *place, runs[place], given)
+            done = Call(name, *place, runs[place], given, tuple(callers(frame)))
             runs[place] += 1
-            return replace(after, keys=(*after.keys, _mark(before, after, done)))
+            marked = copy(after)  # its keys are checked: marks exclude nothing
+            object.__setattr__(marked, "keys", (*after.keys, _mark(before, after, done)))
+            return marked
 
         return call
 

@@ -47,7 +47,7 @@ from motions.language.keys import BalanceShift
 from motions.language.timeline import Timeline
 from motions.language.timeline_data import SAME
 from motions.plan.compiled_plan import Problem
-from motions.plan.tracks import Instants, LegTracks, Poses, Times, followed
+from motions.plan.tracks import Instants, LegTracks, Move, Poses, Times
 
 MARGINS = (0.08, 0.065, 0.05, 0.035, 0.02)
 """Distances [m] of the CoM to the edges of the support polygon that are tried, best first.
@@ -91,9 +91,9 @@ class Balancer:
         self._shifts, self._end = timeline.in_order(BalanceShift), timeline.end
         self._key_ends = sorted(key.end for key in timeline.keys)
 
-    def balance(self) -> tuple[Float[np.ndarray, "n 2"], list[Problem]]:
-        """What to add to the trunk's places [m] (n, 2), and the moments without a balanced pose."""
-        moves, last = [], np.zeros(2)
+    def balance(self) -> tuple[list[Move], list[Problem]]:
+        """What to add to the trunk's places [m], and the moments without a balanced pose."""
+        moves, last = list[Move](), np.zeros(2)
         problems: list[Problem] = []
         starts = [*(shift.start for shift in self._shifts), self._end]
         for shift, end in zip(self._shifts, starts[1:], strict=True):
@@ -105,7 +105,7 @@ class Balancer:
                     problems.append(Problem("balance", "trunk", knot, reason=str(error)))
                 moves.append((replace(shift, start=start, end=knot), last))
                 start = knot
-        return followed(self._times, np.zeros(2), moves), problems
+        return moves, problems
 
     def _knots(self, shift: BalanceShift, end: float) -> list[float]:
         """The end of the shift, and every later end of a key while it lasts."""
@@ -225,6 +225,7 @@ class SwayProblem:
         own_cost += SMOOTHING**6 * _gram(ones, np.tile(spline.jerk, (len(ones), 1)), spline.count)
         self._H = np.zeros((8, 2 * spline.count))
         self._H[::2] = np.repeat(own_cost, 2, axis=1)
+        self._x = np.zeros(2 * spline.count)
 
     def solve(self, stepping: Stepping) -> Float[np.ndarray, "n 2"]:
         """The way [m] in the same stretch with its bias; nothing, at rest, at both ends."""
@@ -241,18 +242,19 @@ class SwayProblem:
     def _least(self, h: Float[np.ndarray, " k"], stiffness: float) -> Float[np.ndarray, " m"]:
         """The x of least f(x) = x' H x + s |max(0, G x - h)|^2.
 
-        Newton's steps, halved until f falls; they end where they would gain nothing.
+        Newton's steps from the last x, halved until f falls; they end where they would gain
+        nothing.
         """
         H, G, first = self._H, self._G, 2 * self._spline.first[self._rows]
         columns, free = first[:, None] + np.arange(8), slice(2 * FIXED, -2 * FIXED)
-        x = np.zeros(H.shape[1])
+        x = self._x
 
         def left(x: Float[np.ndarray, " m"]) -> Float[np.ndarray, " k"]:
-            return (G * x[columns]).sum(axis=1) - h
+            return np.einsum("ij,ij->i", G, x[columns]) - h
 
         def f(x: Float[np.ndarray, " m"], beyond: Float[np.ndarray, " k"]) -> float:
             own = x @ (H[0] * x) + 2.0 * sum(x[d:] @ (H[d, :-d] * x[:-d]) for d in (2, 4, 6))
-            beyond = np.maximum(beyond, 0.0)
+            beyond = beyond[beyond > 0.0]
             return float(own + stiffness * beyond @ beyond)
 
         now = left(x)
@@ -269,6 +271,7 @@ class SwayProblem:
             if better is None:
                 break
             x, now = better
+        self._x = x
         return x
 
 

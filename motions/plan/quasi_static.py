@@ -26,7 +26,15 @@ from motions.language.timeline import Timeline
 from motions.language.timeline_data import SAME, distinct
 from motions.plan.balance import Balancer, swayed
 from motions.plan.compiled_plan import CompiledPlan, Problem, event_at
-from motions.plan.tracks import Instants, JointPaths, LegTracks, Times, body_path, sample_times
+from motions.plan.tracks import (
+    Instants,
+    JointPaths,
+    LegTracks,
+    Times,
+    body_path,
+    followed,
+    sample_times,
+)
 from motions.postures import home_poses, standing_feet
 
 REACH_TOLERANCE = 5e-3
@@ -64,8 +72,8 @@ def compile_quasi_static(
     ground = footing.at(times)
     tracks = LegTracks(timeline, footing, model, home[timeline.entry])
     body = body_path(timeline, home, times, ground)
-    offsets, problems = Balancer(timeline, tracks, model, times, body).balance()
-    body[:, :2] += offsets
+    shifts, problems = Balancer(timeline, tracks, model, times, body).balance()
+    body[:, :2] += followed(times, np.zeros(2), shifts)
     feet = FootContacts(timeline)
     contacts = feet.schedule()
     steps = feet.stepping(contacts)
@@ -73,9 +81,14 @@ def compile_quasi_static(
     for shift in timeline.in_order(BalanceShift):
         if shift.is_swaying:
             rows = slice(*np.searchsorted(times, [shift.start - SAME, shift.end + SAME]).tolist())
-            now = Instants.of(times[rows], body[rows], footing.at(times[rows]))
-            stance = contacts.at_times(times[rows]).stance
-            body[rows, :2] = swayed(now, body[rows], stance, raised[rows], tracks, model)
+            own = shift.start + sample_times(shift.end - shift.start)
+            trunk = body_path(timeline, home, own, footing.at(own))
+            trunk[:, :2] += followed(own, np.zeros(2), shifts)
+            stance = contacts.at_times(own).stance
+            held = ~(stance | steps[event_at(contacts, own)])
+            now = Instants.of(own, trunk, footing.at(own))
+            way = swayed(now, trunk, stance, held, tracks, model) - trunk[:, :2]
+            body[rows, :2] += CubicSpline(own, way, bc_type="clamped")(times[rows])
     now = Instants.of(times, body, ground)
     legs = tracks.paths(now)
     com = centres_of_mass(body, legs.q, model)

@@ -35,6 +35,7 @@ from motions.language.dynamic_blocks import away_from_home
 from motions.language.keys import BalanceShift, BodyKey, FootHold, Key, Mark, PhaseKey
 from motions.language.timeline import Timeline
 from motions.language.timeline_data import SAME
+from motions.memory import Memory
 from motions.plan.compiled_plan import (
     CompiledPlan,
     DynamicSpan,
@@ -44,7 +45,8 @@ from motions.plan.compiled_plan import (
     event_at,
     placed,
 )
-from motions.plan.quasi_static import UNLOAD_TIME, compile_quasi_static
+from motions.plan.parts import known_by, rests
+from motions.plan.quasi_static import UNLOAD_TIME, FootContacts, compile_quasi_static
 from motions.plan.trajectory import Trajectory, trajectory_of
 from motions.postures import standing_feet
 
@@ -166,6 +168,7 @@ def compile_timeline(
     *,
     mend: Broken | None = None,
     progress: Progress | None = None,
+    memory: Memory | None = None,
 ) -> CompiledPlan:
     """The plan of ``timeline``, in the frame of the motion.
 
@@ -178,6 +181,8 @@ def compile_timeline(
             not is solved; without it all is compiled as it is written. ``FeasibilityChecker`` gives
             it where the timeline asks for it.
         progress: called while something is solved, with the number of iterations and the cost.
+        memory: what was compiled before: the timeline is compiled by its parts, from rest to rest,
+            and those that are known are not compiled again.
 
     Raises:
         TimelineError: if it is empty, a dynamic block does not start standing at home, something
@@ -185,11 +190,16 @@ def compile_timeline(
         MissingDependency: if a block must be solved and the solver is not installed.
     """
     blocks = timeline.in_order(PhaseKey)
-    if not blocks and mend is None:
+    if mend is not None:
+        memory = None  # what is near to a motion is found for all of it
+    cuts = [] if memory is None else rests(timeline)
+    if not blocks and mend is None and not cuts:
         return compile_quasi_static(timeline, model, p_feet)
     for block in blocks:
         _require_alone(timeline, block)
     maker = _Maker(timeline, model, p_feet, mend, progress)
+    if memory is not None:
+        maker.remember(memory, cuts)
     for block in blocks:
         maker.add_stretch(block.start, Posture.STAND)
         maker.add_block(block)
@@ -224,6 +234,21 @@ class _Part:
     swings: Bool[np.ndarray, "m 4"]
 
 
+@dataclass(frozen=True, slots=True)
+class _Stretch:
+    """What is written between two rests, counted from the first one."""
+
+    keys: tuple[Key, ...]
+    length: float  #: [s]
+    entry: Posture
+    exit: Posture
+
+    def of(self, line: Timeline) -> Timeline:
+        """It alone, of ``line``."""
+        ends = {"entry": self.entry, "exit": self.exit}
+        return replace(line, keys=self.keys, cursor=self.length, **ends)
+
+
 class _Maker:
     """Makes the parts of a plan, one after the other.
 
@@ -247,33 +272,52 @@ class _Maker:
         self._spans: list[DynamicSpan] = []
         self._problems: list[Problem] = []
         self._ramps: list[float] = []
+        self._ramp = UNLOAD_TIME
+        self._memory: Memory | None = None
+        self._cuts: Sequence[float] = ()
         if p_feet is not None:
             self._move_on(0.0, p_feet, 0.0)
 
+    def remember(self, memory: Memory, cuts: Sequence[float]) -> None:
+        """Compile by the parts between ``cuts`` [s], with what ``memory`` has of them."""
+        self._memory, self._cuts = memory, cuts
+
     def add_stretch(self, end: float, exit: Posture) -> None:
         """What is written from here to ``end`` [s]."""
-        start, line = self._time, self._timeline
+        start = self._time
         if end - start < SHORTEST:
             return
-        keys = [
+        count, keys = len(self._problems), self._keys(start, end)
+        self._ramp = FootContacts(replace(self._timeline, keys=tuple(keys))).ramp()
+        for cut in self._cuts:
+            if self._time + SHORTEST < cut < end - SHORTEST:
+                self._add_part(self._keys(self._time, cut), cut, Posture.STAND)
+        self._add_part(self._keys(self._time, end), end, exit)
+        self._problems[count:] = _worst(self._problems[count:])
+
+    def _keys(self, start: float, end: float) -> list[Key]:
+        """What is written from ``start`` to ``end`` [s], counted from there."""
+        return [
             key.later(-start)
-            for key in line.keys
+            for key in self._timeline.keys
             if not isinstance(key, PhaseKey | Mark) and start - SAME <= key.start < end - SAME
         ]
-        entry = line.entry if start == 0.0 else Posture.STAND
-        stretch = replace(line, cursor=end - start, entry=entry, exit=exit)
-        plan = self._compiled(stretch, keys or [replace(_RESTING, end=end - start)])
-        done = 0.0
+
+    def _add_part(self, keys: list[Key], end: float, exit: Posture) -> None:
+        length = end - self._time
+        entry = self._timeline.entry if self._time == 0.0 else Posture.STAND
+        part = _Stretch(tuple(keys) or (replace(_RESTING, end=length),), length, entry, exit)
+        plan, done = self._compiled(part), 0.0
         if self._broken is not None and keys:
-            done = self._add_repaired(self._broken(plan), plan, replace(stretch, keys=tuple(keys)))
+            done = self._add_repaired(self._broken(plan), plan, part)
         self._add_written(plan, done, plan.duration)
         last = plan.curves(plan.duration)
         self._move_on(end, last[18:].reshape(4, 3), last[5])
 
     def _add_repaired(
-        self, broken: Float[np.ndarray, " k"], plan: CompiledPlan, line: Timeline
+        self, broken: Float[np.ndarray, " k"], plan: CompiledPlan, stretch: _Stretch
     ) -> float:
-        """``plan``, which ``line`` was compiled to, up to the last part that is repaired.
+        """``plan``, which ``stretch`` was compiled to, up to the last part that is repaired.
 
         ``broken``: when it breaks a limit [s]. Returns how far that goes [s]; a part to which
         nothing is near stays as it is written.
@@ -282,9 +326,10 @@ class _Maker:
         if not len(broken):
             return done
         path = as_checked = trajectory_of(plan, self._model)
-        asked = without_vain_shifts(line)
+        line = stretch.of(self._timeline)
+        asked = replace(stretch, keys=without_vain_shifts(line).keys)
         if len(asked.keys) < len(line.keys):
-            path = trajectory_of(self._compiled(asked, asked.keys), self._model)
+            path = trajectory_of(self._compiled(asked), self._model)
         for piece in pieces_to_repair(path, as_checked, broken):
             try:
                 written = piece.written(path)
@@ -318,7 +363,7 @@ class _Maker:
             for one in plan.problems
             if start <= one.time <= end
         ]
-        self._ramps.append(plan.ramp)
+        self._ramps.append(self._ramp)
 
     def _fail(self, check: str, error: PlanNotFound, time: float) -> None:
         reason = "; ".join([str(error).split("\n")[0], *error.reasons])
@@ -339,8 +384,8 @@ class _Maker:
         yaw = float(attitude_angles(found.q)[-1, 2])
         asked = self._feet + problem.shift
         self._move_on(start + found.duration, asked, yaw, landed=found.p_feet[-1])
-        rest = replace(self._timeline, entry=Posture.STAND, exit=Posture.STAND, cursor=1.0)
-        home = self._compiled(rest, [replace(_RESTING, end=1.0)]).curves
+        rest = _Stretch((replace(_RESTING, end=1.0),), 1.0, Posture.STAND, Posture.STAND)
+        home = self._compiled(rest).curves
         self._solved(found, problem, _moved(home, self._frame)(0.0), start, frame)
 
     def _solved(
@@ -386,9 +431,15 @@ class _Maker:
             held={key.name: key.leg for key in line.in_order(FootHold)},
         )
 
-    def _compiled(self, stretch: Timeline, keys: Sequence[Key]) -> CompiledPlan:
-        feet = None if self._feet is self._home else self._feet
-        return compile_quasi_static(replace(stretch, keys=tuple(keys)), self._model, feet)
+    def _compiled(self, stretch: _Stretch) -> CompiledPlan:
+        feet, model = None if self._feet is self._home else self._feet, self._model
+        if self._memory is None:
+            return compile_quasi_static(stretch.of(self._timeline), model, feet)
+        stretch = replace(stretch, keys=known_by(stretch.keys), length=round(stretch.length, 9))
+        known = stretch, None if feet is None else tuple(np.round(feet, 9).ravel().tolist())
+        return self._memory.part(
+            known, lambda: compile_quasi_static(stretch.of(self._timeline), model, feet)
+        )
 
     def _move_on(
         self,
@@ -415,8 +466,19 @@ class _Maker:
         self._time, self._frame = time, Anchor(to, frame.yaw + here.yaw + turns)
 
 
+def _worst(problems: Sequence[Problem]) -> list[Problem]:
+    """Of places that a leg does not reach the farthest one, as of a motion in one part."""
+    far = dict[str, Problem]()
+    for one in problems:
+        if not np.isnan(one.miss) and one.miss > getattr(far.get(one.subject), "miss", 0.0):
+            far[one.subject] = one
+    return [one for one in problems if np.isnan(one.miss) or far[one.subject] is one]
+
+
 def _moved(curves: PPoly, frame: Anchor) -> PPoly:
     """``curves`` of a part, in the frame of the motion: its coefficients turn as places do."""
+    if frame.yaw == 0.0 and not frame.p_world.any():
+        return curves
     R, c = yaw_rotation(frame.yaw), curves.c.copy()
     for column in (0, *range(18, 30, 3)):
         c[:, :, column : column + 3] = curves.c[:, :, column : column + 3] @ R.T

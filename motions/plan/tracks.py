@@ -110,7 +110,7 @@ def eased(key: Key, times: Times) -> Float[np.ndarray, " n"]:
     s = np.clip((times - key.start) / (key.end - key.start), 0.0, 1.0)
     shares = np.where(s < 1.0, 0.0, 1.0)
     during = (s > 0.0) & (s < 1.0)
-    shares[during] = [key.ease.progress(float(value))[0] for value in s[during]]
+    shares[during] = key.ease.ways(s[during])
     return shares
 
 

@@ -22,6 +22,7 @@ from go2_wbc.recording import true_runs
 from go2_wbc.robot.model import RobotModel
 from motions import batch_kinematics
 from motions.dynamics.solver import PlanTarget
+from motions.memory import Memory
 from motions.plan.compiled_plan import CompiledPlan, DynamicSpan, PlanSamples
 from motions.plan.tracks import sample_times
 from motions.postures import standing_feet
@@ -51,8 +52,10 @@ class Trajectory:
     __repr__ = brief
 
 
-def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
+def trajectory_of(plan: MotionPlan, model: RobotModel, memory: Memory | None = None) -> Trajectory:
     """The trajectory of ``plan``; of one that does not say where, the feet stand below the hips.
+
+    ``memory``: of plans that are like it.
 
     Raises:
         MotionError: if the plan is not finite.
@@ -64,7 +67,7 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
     _require_finite(asked)
     rpy = np.unwrap(batch_kinematics.angles_of(asked.R), axis=0)
     placed = batch_kinematics.place(
-        replace(asked, R=batch_kinematics.attitudes(rpy)), CENTRING_STEPS, model
+        replace(asked, R=batch_kinematics.attitudes(rpy)), CENTRING_STEPS, model, memory
     )
     q = batch_kinematics.configurations(np.hstack([placed.p_base, rpy]), placed.q_joints)
     spans = plan.dynamic if isinstance(plan, CompiledPlan) else ()

@@ -13,6 +13,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.recording import Recording
@@ -178,6 +179,21 @@ class PosedRobot:
         """Centres of the four feet in the world [m]."""
         pin.framesForwardKinematics(self._model, self._data, q)
         return np.array([self._data.oMf[frame].translation for frame in self._foot_frames])
+
+    def feet_along(self, q: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 4 3"]:
+        """What ``feet`` says of every configuration."""
+        model, places = self._model, np.empty((len(q), 4, 3))
+        base = Rotation.from_quat(q[:, 3:7]).as_matrix()
+        for leg, frame in enumerate(self._foot_frames):
+            p, R, foot = q[:, :3], base, model.frames[frame]
+            for joint in model.supports[foot.parentJoint].tolist()[2:]:
+                T, angles = model.jointPlacements[joint], q[:, model.idx_qs[joint], None, None]
+                # About a unit axis with the cross product K: 1 + sin K + (1 - cos) K^2 (Rodrigues).
+                K = pin.skew(np.ravel(model.joints[joint].createData().S)[3:])
+                p, R = p + R @ T.translation, R @ T.rotation
+                R = R + np.sin(angles) * (R @ K) + (1.0 - np.cos(angles)) * (R @ (K @ K))
+            places[:, leg] = p + R @ foot.placement.translation
+        return places
 
     def on_trunk(self, points: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
         """Points of the base frame in the world [m], in the configuration placed last."""

@@ -79,19 +79,22 @@ class Pack:
         scale = span / _QUANTISED_LEVELS
         self.add(name, levels, {"low": low.tolist(), "scale": scale.tolist()})
 
-    def packed(self, header: dict[str, object]) -> str:
-        """Everything, with ``header`` beside the table of the arrays."""
+    def packed(self, header: dict[str, object], *, is_brief: bool = False) -> str:
+        """Everything, with ``header`` beside the table of the arrays; see ``compressed_text``."""
         table = json.dumps({**header, "arrays": self._entries}, separators=(",", ":"))
         head = table.encode()
         start = 4 + len(head)
         padding = b"\0" * (-start % _ALIGNMENT)
         content = len(head).to_bytes(4, "little") + head + padding + b"".join(self._blobs)
-        return compressed_text(content)
+        return compressed_text(content, is_brief=is_brief)
 
 
-def compressed_text(content: bytes) -> str:
-    """Gzipped and base64; the same content always gives the same text."""
-    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode("ascii")
+def compressed_text(content: bytes, *, is_brief: bool = False) -> str:
+    """Gzipped and base64; the same content always gives the same text.
+
+    What ``is_brief`` is read once on the same machine: it need not be small.
+    """
+    return base64.b64encode(gzip.compress(content, 1 if is_brief else 9, mtime=0)).decode("ascii")
 
 
 _NORMAL_LEVELS = 127  # of a signed 8-bit number
@@ -120,7 +123,8 @@ def robot_scene(visuals: RobotVisuals, pack: Pack) -> dict[str, object]:
 
     Returns:
         Header entries: ``meshes`` (count), ``commands``, ``base`` (path of the moving trunk) and
-        ``joints`` (path and axis of each joint, in the order of q).
+        ``joints`` (path, axis and limits [rad] of each joint, in
+        the order of q).
     """
     commands: list[object] = []
     window = SimpleNamespace(send=lambda command: commands.append(command.lower()))
@@ -133,7 +137,10 @@ def robot_scene(visuals: RobotVisuals, pack: Pack) -> dict[str, object]:
         fixed.set_transform(model.jointPlacements[joint].homogeneous)
         # The lower half of a revolute joint's motion subspace is its axis, in its own frame.
         axis = np.ravel(model.joints[joint].createData().S)[3:].tolist()
-        joints.append({"path": paths[joint], "axis": axis})
+        row = model.joints[joint].idx_q
+        limits = model.lowerPositionLimit[row], model.upperPositionLimit[row]
+        low, high = (float(limit) for limit in limits)
+        joints.append({"path": paths[joint], "axis": axis, "low": low, "high": high})
     used: Counter[str] = Counter()
     for item in visuals.geometry.geometryObjects:
         link = "base" if item.parentJoint == 1 else model.frames[item.parentFrame].name
@@ -257,8 +264,13 @@ def scene_text(recording: Recording) -> str:
     return pack.packed({**scene, **legs, "foot_radius": visuals.foot_radius})
 
 
-def content_text(content: ReplayContent, title: str, version: str = "") -> str:
-    """What happens, packed; ``version`` tells one text of a live page from the next."""
+def content_text(
+    content: ReplayContent, title: str, version: str = "", *, is_brief: bool = False
+) -> str:
+    """What happens, packed.
+
+    ``version`` tells one text of a live page from the next; see ``compressed_text``.
+    """
     pack = Pack()
     rate, frames = replay_frames(content.recording)
     highest = float(np.percentile(frames["forces"], _FORCE_PERCENTILE))
@@ -296,7 +308,7 @@ def content_text(content: ReplayContent, title: str, version: str = "") -> str:
     for name, other in (("ghost", content.ghost), ("written", content.written)):
         if other is not None:
             header[name] = _add_frames(pack, f"{name}.", *replay_frames(other))
-    return pack.packed(header)
+    return pack.packed(header, is_brief=is_brief)
 
 
 def replay_frames(recording: Recording) -> tuple[float, dict[str, np.ndarray]]:
@@ -317,7 +329,7 @@ def replay_frames(recording: Recording) -> tuple[float, dict[str, np.ndarray]]:
     rows[-1] = last
     visuals, q = visuals_of(recording), _continuous(recording.q[rows])
     robot = PosedRobot(visuals)
-    feet = np.array([robot.feet(row) for row in q])
+    feet = robot.feet_along(q)
     heights = feet[:, :, 2].mean(axis=1) - visuals.foot_radius
     heights = heights if len(recording.ground) else np.zeros(count)
     below = np.interp(recording.time, wanted, heights)
@@ -394,15 +406,17 @@ def reduced(curve: MarginCurve) -> MarginCurve:
     if step <= 1:
         return curve
     known = np.where(np.isnan(curve.margin), np.inf, curve.margin)
-    edges = range(0, len(known), step)
-    rows = np.array([start + int(known[start : start + step].argmin()) for start in edges])
+    steps = np.pad(known, (0, -len(known) % step), constant_values=np.inf).reshape(-1, step)
+    rows = step * np.arange(len(steps)) + steps.argmin(axis=1)
     return replace(curve, time=curve.time[rows], margin=curve.margin[rows], worst=curve.worst[rows])
 
 
 HTML_SUFFIXES = (".html", ".htm")
 PAGE_LIMIT = 4_000_000  #: Largest page [bytes]
 _SCRIPTS = "data stage scene ghost steps flags charts binding trust verdict sound app"
-"""Of the assets, in the order in which they need one another; a live page has another one."""
+_EDITOR = "words view tracks inspector hands music tools tour page"
+"""Of the assets, in the order in which they need one another; a live page has another one, and one
+that edits those of the studio."""
 
 
 @typed()
@@ -442,7 +456,8 @@ def page_text(
     A live one listens to its server; an editor has bars besides, and needs ``content.editor``.
     """
     names = [f"replay_{name}" for name in _SCRIPTS.split()]
-    names += ["replay_live"] * is_live + ["studio_tracks", "studio_inspector", "studio"] * is_editor
+    names += ["replay_live"] * is_live
+    names += [f"studio_{name}" for name in _EDITOR.split()] * is_editor
     bundle = Path(meshcat.viewer_assets_path()) / "dist" / "main.min.js"
     parts = {
         "TITLE": html.escape(title),

@@ -30,7 +30,7 @@ LOOPBACK = "127.0.0.1"
 LOOPBACK_NAMES = (LOOPBACK, "localhost", "[::1]")
 _HEARTBEAT = 10.0
 """A page that hears nothing for so long [s] gets an empty line, which finds closed pages."""
-_MOST_SENT = 4096  #: Longest text [bytes] that a page may send
+_MOST_SENT = 65_536  #: Longest text [bytes] that a page may send
 TOKEN_HEADER = "X-Studio-Token"
 Values = dict[str, float | str]  #: What was chosen for parameters, by their names
 Action = Callable[[Mapping[str, object]], Mapping[str, object]]  #: Answers JSON with JSON
@@ -105,13 +105,14 @@ class PreviewServer(ThreadingHTTPServer):
         self._thread = threading.Thread(target=self.serve_forever, args=(0.05,), daemon=True)
         self._thread.start()
 
-    def publish(self, content: ReplayContent) -> None:
-        """Show this from now on, and no error.
+    def publish(self, content: ReplayContent, title: str = "") -> None:
+        """Show this from now on, under another title if there is one, and no error.
 
         Raises:
             ConfigError: for a recording that cannot be drawn.
         """
         with self._changed:
+            self._title = title or self._title
             self._pack(content)
             self._changed.notify_all()
 

@@ -221,3 +221,106 @@ def test_a_file_without_a_motion_does_not_open(tmp_path: Path) -> None:
     with pytest.raises(StudioError, match="defines no motion"):
         Studio(file, None, 0)
     assert time.monotonic() - start < running.LONGEST_WORK
+
+
+def test_another_motion_of_the_file_is_chosen(studio: Studio, file: Path) -> None:
+    assert "unknown motion" in str(studio.choose({"motion": "bow"})["error"])
+    other = GREET + "\n\n" + GREET[GREET.index("@motion") :].replace("greet", "bow")
+    file.write_text(other, encoding="utf-8")
+    _look(studio)
+    assert studio.choose({"motion": "bow"}) == {}
+    assert studio.motion == "bow"
+    assert studio.choose({"motion": "greet"}) == {}
+
+
+def test_what_is_no_song_beside_the_file_is_refused(studio: Studio, file: Path) -> None:
+    for name in ("../song.wav", "song.wav", 7):
+        assert "unknown song" in str(studio.music({"name": name})["error"])
+    file.with_name("song.wav").write_bytes(b"no sound")
+    assert "song.wav" in str(studio.music({"name": "song.wav"})["error"])
+
+
+def test_nothing_is_copied_from_where_no_call_ends(studio: Studio) -> None:
+    assert "no call ends" in str(studio.copy({"sites": [[1, 1]]})["error"])
+
+
+HELPERS = """from motions import Timeline, deg, motion
+
+
+def nod(line: Timeline, angle: float) -> Timeline:
+    return line.body(pitch=deg(angle), over=0.5)
+
+
+@motion
+def greet() -> Timeline:
+    line = nod(Timeline(), 5.0)
+    for angle in (4.0, 3.0):
+        line = nod(line, angle)
+    return line.home(over=0.5)
+"""
+
+
+def test_a_bar_of_a_helper_is_edited_where_it_is_called(studio: Studio, file: Path) -> None:
+    file.write_text(HELPERS, encoding="utf-8")
+    _look(studio)
+    editor = _editor(studio)
+    bars = [bar for bar in editor["bars"] if bar["name"] == "body"]
+    assert [bar["slots"][0]["value"] for bar in bars] == [5.0, 4.0, 3.0]
+    site, base = bars[2]["site"], editor["base"]
+    offered = studio.edit({"op": "offers", "site": site, "number": 2, "base": base})["offers"]
+    assert [offer["op"] for offer in offered] == ["parameter", "pace"]  # type: ignore[index, union-attr]
+    order = {"op": "set", "site": site, "number": 2, "name": "pitch", "value": 6.5, "base": base}
+    assert "error" not in studio.edit({**order, "commit": True})
+    assert file.read_text(encoding="utf-8") == HELPERS.replace("4.0, 3.0", "4.0, 6.5")
+
+
+def test_a_loop_is_written_out_and_the_whole_undone(studio: Studio, file: Path) -> None:
+    text = GREET.replace("range(times)", "range(2)")
+    file.write_text(text, encoding="utf-8")
+    _look(studio)
+    editor = _editor(studio)
+    (bar, *_) = (bar for bar in editor["bars"] if bar["name"] == "foot")
+    order = {"op": "unroll", "site": bar["site"], "number": 0, "base": editor["base"]}
+    assert "error" not in studio.edit({**order, "commit": True})
+    line = '    line = line.foot("FR", z=0.08, over=0.5).down("FR", over=0.5)\n'
+    assert 2 * line in file.read_text(encoding="utf-8")
+    studio.edit({"op": "undo"})
+    assert file.read_text(encoding="utf-8") == text
+
+
+def test_an_empty_motion_is_shown_and_begun(studio: Studio, file: Path) -> None:
+    empty = "from motions import Timeline, deg, motion\n\n\n@motion\ndef greet() -> Timeline:\n"
+    file.write_text(f"{empty}    return Timeline()\n", encoding="utf-8")
+    _look(studio)
+    editor = _editor(studio)
+    assert editor["bars"] == []
+    order = {"op": "begin", "title": "Tilt the trunk", "base": editor["base"]}
+    assert "error" not in studio.edit({**order, "commit": True})
+    assert [bar["name"] for bar in _editor(studio)["bars"]] == ["body"]
+
+
+def test_modules_beside_the_file_are_read_anew_and_random_numbers_are_told(
+    studio: Studio, file: Path
+) -> None:
+    helper = file.with_name("deepness.py")
+    helper.write_text("DEEP = -0.02\n", encoding="utf-8")
+    text = GREET.replace("from motions", "from deepness import DEEP\nfrom motions").replace(
+        "pitch=deg(10.0)", "z=DEEP"
+    )
+    file.write_text(text, encoding="utf-8")
+    _look(studio)
+    before = _shown(studio._server.data)["verdict"]["chance"]
+    assert _editor(studio)["notes"] == []
+    helper.write_text("DEEP = -0.30\n", encoding="utf-8")
+    file.write_text(f"{text}# again\n", encoding="utf-8")
+    _look(studio)
+    assert _shown(studio._server.data)["verdict"]["chance"] < before
+    text = f"import random\n{GREET}".replace("def greet(", "def other(").replace(
+        "z=0.08", "z=random.uniform(0.05, 0.08)"
+    )
+    studio.motion = "other"
+    file.write_text(text, encoding="utf-8")
+    _look(studio)
+    (note,) = _editor(studio)["notes"]
+    assert "random" in note
+    studio.motion = "greet"

@@ -1,5 +1,6 @@
 """How far the trunk is off its plan, held to what MuJoCo's was in motions drawn for that alone."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from go2_wbc.world import World
 from motions import FeasibilityChecker, FeasibilityReport, Timeline, deg
 from motions.feasibility.tracking import resistance
+from tests.motions.feasibility.cases import case_of
 
 
 def to_and_fro(channel: str, size: float, over: float, times: int = 1) -> Timeline:
@@ -55,9 +57,9 @@ def test_a_roll_that_comes_late_is_refused_and_a_smaller_one_is_not(
 def test_stiff_joints_hold_the_trunk_back_more_and_four_feet_cannot_tip(
     checker: FeasibilityChecker,
 ) -> None:
-    path = checker.evaluate(to_and_fro("roll", 0.4, 0.4)).path
+    case = case_of(checker.evaluate(to_and_fro("roll", 0.4, 0.4)).path, checker.model)
     by_friction = [
-        np.abs(resistance(path, checker.model, World(joint_friction=share))[0]).max()
+        np.abs(resistance(replace(case, world=World(joint_friction=share)))[0]).max()
         for share in (0.5, 1.0, 2.0)
     ]
     assert by_friction == sorted(by_friction)

@@ -74,10 +74,14 @@ class Tab:
         requested: addresses that it asked for, without those inside itself.
     """
 
-    def __init__(self, browser: Browser, *, offline: bool = False) -> None:
+    def __init__(
+        self, browser: Browser, *, offline: bool = False, is_dark: bool = False, touch: bool = False
+    ) -> None:
         self._context = browser.new_context(
             viewport={"width": _SIZE[0], "height": _SIZE[1]},
             offline=offline,
+            color_scheme="dark" if is_dark else "light",
+            has_touch=touch,
             reduced_motion="reduce",  # drawing each frame in software would cost most of the time
         )
         self._context.set_default_timeout(_PATIENCE)

@@ -181,7 +181,7 @@ function bindControls(player) {
     else if (views[key]) player.scene.setView(views[key]);
     else if (toggles[key]) player.toggle(toggles[key]);
     else if (ghosts[key] && player.data[ghosts[key]]) player.cycleGhost(ghosts[key]);
-    else if (key === "m" && player.data.sound) player.sound.toggle();
+    else if (key === "m" && player.sound.audio) player.sound.toggle();
     else if (key === "n" && player.data.annotations.length) player.jumpToNext();
     else return;
     event.preventDefault();

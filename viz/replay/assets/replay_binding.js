@@ -38,12 +38,14 @@ class Binding extends TimeCanvas {
       paint.fillStyle = SOFT;
       paint.fillRect(this.left, k * row, width, row - 2);
     });
-    for (const { from, to, leg, color } of this.spans) {
-      const x = this.xAt(from);
-      paint.fillStyle = color;
-      const [top, height] = leg < 0 ? [0, this.height - 2] : [leg * row, row - 2];
-      paint.fillRect(x, top, Math.max(this.xAt(to) - x, 1.5), height);
-    }
+    this.inside(paint, () => {
+      for (const { from, to, leg, color } of this.spans) {
+        const x = this.xAt(from);
+        paint.fillStyle = color;
+        const [top, height] = leg < 0 ? [0, this.height - 2] : [leg * row, row - 2];
+        paint.fillRect(x, top, Math.max(this.xAt(to) - x, 1.5), height);
+      }
+    });
   }
 
   show(t) {

@@ -30,13 +30,30 @@ class TimeCanvas {
     this.redraw();
   }
 
+  // The part of the time that is shown [s]: all of it, unless a `view` says otherwise.
+  get span() {
+    return this.view ?? { from: 0, length: this.data.duration };
+  }
+
   xAt(t) {
-    return this.left + (this.width - this.left - this.right) * t / this.data.duration;
+    const { from, length } = this.span;
+    return this.left + (this.width - this.left - this.right) * (t - from) / length;
   }
 
   timeAt(x) {
+    const { from, length } = this.span;
     const share = (x - this.left) / (this.width - this.left - this.right);
-    return this.data.clampTime(share * this.data.duration);
+    return this.data.clampTime(from + share * length);
+  }
+
+  // Draws what may reach beyond the part of the time that is shown.
+  inside(paint, draw) {
+    paint.save();
+    paint.beginPath();
+    paint.rect(this.left, 0, this.width - this.left - this.right, this.height);
+    paint.clip();
+    draw();
+    paint.restore();
   }
 
   show(t) {
@@ -45,7 +62,8 @@ class TimeCanvas {
     const paint = this.canvas.getContext("2d");
     paint.clearRect(0, 0, this.width, this.height);
     paint.drawImage(this.picture, 0, 0, this.width, this.height);
-    this.drawCursor(paint, this.xAt(t));
+    const x = this.xAt(t);
+    if (x > this.left - 1 && x < this.width - this.right + 1) this.drawCursor(paint, x);
   }
 
   // Shows other data.
@@ -87,13 +105,14 @@ class Timeline extends TimeCanvas {
     const [labels, axis] = [22, 18];
     const top = labels + 6 + (this.data.annotations.length ? LANE + 5 : 0);
     const row = (this.height - top - axis) / 4;
-    this.drawLabels(paint, labels);
-    this.drawAnnotations(paint, labels + 5);
-    this.data.header.legs.forEach((leg, k) => {
-      this.drawLeg(paint, leg, k, top + k * row, row - 3);
+    this.drawNames(paint, top, row, labels + 5);
+    this.inside(paint, () => {
+      this.drawLabels(paint, labels);
+      this.drawAnnotations(paint, labels + 5);
+      this.data.header.legs.forEach((_, k) => this.drawLeg(paint, k, top + k * row, row - 3));
+      this.drawBeats(paint, this.height - axis);
     });
     this.drawAxis(paint, this.height - axis);
-    this.drawBeats(paint, this.height - axis);
   }
 
   // The beats that the motion counts in: a line for each, a longer and darker one where a bar
@@ -141,22 +160,27 @@ class Timeline extends TimeCanvas {
         roundedBox(paint, this.xAt((from + to) / 2) - width / 2, top, width, LANE, 2);
       }
     }
-    paint.fillStyle = this.data.header.verdict.ok ? WARN : BAD;
-    paint.font = `700 12px ${FONT}`;
+  }
+
+  // What each row is of, to the left of it.
+  drawNames(paint, top, row, notes) {
+    const { annotations, header: { legs, leg_colors: colors, verdict } } = this.data;
     paint.textAlign = "left";
     paint.textBaseline = "middle";
-    paint.fillText("!", 9, top + LANE / 2 + 0.5);
+    paint.font = `700 12px ${FONT}`;
+    paint.fillStyle = verdict?.ok ? WARN : BAD;
+    if (annotations.length) paint.fillText("!", 9, notes + LANE / 2 + 0.5);
+    paint.font = `700 11px ${FONT}`;
+    legs.forEach((leg, k) => {
+      paint.fillStyle = IS_DARK.matches ? INK : colors[k];
+      paint.fillText(leg, 4, top + k * row + (row - 3) / 2 + 0.5);
+    });
   }
 
   // Planned stance as a pale block, measured force as a filled curve in it.
-  drawLeg(paint, leg, k, top, height) {
+  drawLeg(paint, k, top, height) {
     const { data } = this;
     const color = data.header.leg_colors[k];
-    paint.fillStyle = IS_DARK.matches ? INK : color;
-    paint.font = `700 11px ${FONT}`;
-    paint.textAlign = "left";
-    paint.textBaseline = "middle";
-    paint.fillText(leg, 4, top + height / 2 + 0.5);
     paint.fillStyle = SOFT;
     paint.fillRect(this.left, top, this.width - this.left - this.right, height);
     const half = 0.5 / data.rate;
@@ -190,14 +214,15 @@ class Timeline extends TimeCanvas {
   }
 
   drawAxis(paint, top) {
-    const step = tickStep(this.data.duration, this.width - this.left);
+    const { from, length } = this.span;
+    const step = tickStep(length, this.width - this.left);
     const digits = Math.max(0, -Math.floor(Math.log10(step)));
     paint.fillStyle = MUTED;
     paint.font = `11px ${FONT}`;
     paint.textBaseline = "top";
-    for (let k = 0; k * step <= this.data.duration + 1e-9; k++) {
+    for (let k = Math.ceil(from / step - 1e-9); k * step <= from + length + 1e-9; k++) {
       const x = this.xAt(k * step);
-      paint.textAlign = k === 0 ? "left" : x > this.width - 24 ? "right" : "center";
+      paint.textAlign = x < this.left + 12 ? "left" : x > this.width - 24 ? "right" : "center";
       paint.fillRect(Math.min(x, this.width - 1), top, 1, 3);
       paint.fillText(`${(k * step).toFixed(digits)} s`, x, top + 5);
     }

@@ -6,14 +6,23 @@ const OUT_OF_STEP = 0.03; // s, from which on the picture follows the music
 class Sound {
   constructor() {
     this.audio = null;
+    this.kept = null;
     this.isMuted = false;
     this.button = document.querySelector("[data-sound]");
   }
 
+  // Music (an MP3 file) that goes with whatever is shown.
+  keep(song) {
+    this.kept = song;
+  }
+
   use(data) {
+    const sound = data.sound ?? this.kept;
+    if (sound && sound === this.sound) return;
+    this.sound = sound;
     this.play(false, 0, 1);
     if (this.audio) URL.revokeObjectURL(this.audio.src);
-    const file = data.sound && new Blob([data.sound], { type: "audio/mpeg" });
+    const file = sound && new Blob([sound], { type: "audio/mpeg" });
     this.audio = file && new Audio(URL.createObjectURL(file));
     if (this.audio) this.audio.muted = this.isMuted;
     document.getElementById("app").classList.toggle("has-sound", this.audio !== null);

@@ -2,7 +2,6 @@
 // The arguments of the chosen call: numbers with their units, words, and what is computed.
 
 const DRAFT_REST = 60; // ms after the last key that a draft is shown
-const LENGTHS = ["x", "y", "z", "height", "reach"];
 
 class Inspector {
   constructor(studio) {
@@ -11,7 +10,7 @@ class Inspector {
     this.box.append(element("h2"), element("div"));
   }
 
-  use(bar, editor, timeUnit) {
+  use(bar, editor, timeUnit, count) {
     if (this.box.contains(document.activeElement) && bar && this.shape === shapeOf(bar)) {
       return this.refresh(bar);
     }
@@ -22,11 +21,22 @@ class Inspector {
       return rows.replaceChildren();
     }
     const times = bar.runs > 1 ? `, runs ${bar.runs} times` : "";
-    title.textContent = `${bar.name}(), ${isOwn(bar) ? `line ${bar.site[0]}${times}` : "written in another file"}`;
+    const more = count > 1 ? ` and ${count - 1} more` : "";
+    const where = isOwn(bar) ? `line ${bar.site[0]}${times}` : "written in another file";
+    title.replaceChildren(element("b", { textContent: described(bar)[0] + more }), ` ${bar.name}(), ${where}`);
     rows.replaceChildren(...bar.slots.map((slot) => this.row(bar, slot, editor, timeUnit)));
     if (bar.broken) rows.append(element("p", { className: "broken", textContent: bar.broken }));
     if (isOwn(bar) && bar.more.length) rows.append(this.adder(bar, editor));
+    if (isOwn(bar)) this.offer(bar, rows);
     return null;
+  }
+
+  // Ways to make what is computed a number of its own, asked for where there is such.
+  async offer(bar, rows) {
+    const { shape } = this;
+    if (bar.runs < 2 && bar.slots.every((slot) => slot.span)) return;
+    const offers = await this.studio.offers(bar);
+    if (shape === this.shape && offers.length) rows.append(buttonsOf(offers));
   }
 
   // What is typed is not meant: leaving the field would save it.
@@ -38,9 +48,23 @@ class Inspector {
     this.forget();
   }
 
+  focus() {
+    const field = this.box.querySelector("input, select");
+    field?.focus();
+    field?.select?.();
+  }
+
   // The next call is shown anew, whatever is typed into.
   forget() {
     this.shape = "";
+  }
+
+  // While a hand is at it, before the server has answered.
+  follow(values) {
+    for (const [name, value] of Object.entries(values)) {
+      const input = this.box.querySelector(`[data-slot="${name}"]`);
+      if (input && input !== document.activeElement) input.value = value;
+    }
   }
 
   // Other values in the same fields; the one that is typed into stays.
@@ -55,13 +79,16 @@ class Inspector {
   row(bar, slot, editor, timeUnit) {
     this.bar = bar;
     const row = element("label");
-    row.append(element("span", { textContent: readable(slot.name) }));
+    const [name, hint = ""] = ARGUMENTS[slot.name] ?? [readable(slot.name), ARGUMENTS[slot.of]?.[1]];
+    const unit = unitOf(slot, timeUnit);
+    row.title = [`${slot.name}: ${hint || name.toLowerCase()}`, unit && `in ${unitName(unit)}`].filter(Boolean).join(", ");
+    row.append(element("span", { textContent: name }));
     if (!slot.span) {
-      row.append(element("code", { textContent: slot.code, title: slot.why }), element("small", { textContent: "computed" }));
+      row.append(element("code", { textContent: slot.code, title: slot.why }), element("small", { textContent: "computed", title: slot.why }));
       return row;
     }
     const isWord = typeof slot.value === "string";
-    const words = isWord ? editor.words[`${bar.name}.${slot.name}`] ?? editor.words[slot.name] : null;
+    const words = isWord ? [`${bar.name}.${slot.name}`, slot.name, slot.of].map((key) => editor.words[key]).find(Boolean) : null;
     const input = element(words ? "select" : "input");
     if (words) input.append(...[...new Set([...words, slot.value])].map((word) => new Option(word)));
     else Object.assign(input, isWord ? { type: "text" } : { type: "number", step: stepOf(slot) });
@@ -77,7 +104,7 @@ class Inspector {
       if (!isWord) this.resting = setTimeout(() => send(false), DRAFT_REST);
     });
     input.addEventListener("change", () => this.isGivenUp || send(true));
-    const note = slot.place ? `${unitOf(slot, timeUnit)} · ${slot.place}` : unitOf(slot, timeUnit);
+    const note = slot.place ? `${unit} · ${slot.place}` : unit;
     row.append(input, element("small", { textContent: note, title: note }));
     return row;
   }
@@ -85,7 +112,7 @@ class Inspector {
   adder(bar, editor) {
     const select = element("select", { className: "adder" });
     select.setAttribute("aria-label", "Add an argument");
-    select.append(new Option("Add an argument…", ""), ...bar.more.map((name) => new Option(readable(name), name)));
+    select.append(new Option("Add an argument…", ""), ...bar.more.map((name) => new Option(ARGUMENTS[name]?.[0] ?? readable(name), name)));
     select.addEventListener("change", () => {
       const name = select.value;
       if (name) this.studio.set(bar, name, firstValue(bar, name, editor), true);
@@ -95,20 +122,12 @@ class Inspector {
 }
 
 function shapeOf(bar) {
-  return JSON.stringify([bar.name, bar.number, bar.runs, bar.slots.map(({ name, span }) => [name, Boolean(span)])]);
+  return JSON.stringify([bar.name, bar.site[0], bar.number, bar.runs, bar.slots.map(({ name, span }) => [name, Boolean(span)])]);
 }
 
 function stepOf({ name, is_angle: isAngle }) {
   if (isAngle) return 1;
   return LENGTHS.includes(name) ? 0.005 : 0.05;
-}
-
-function unitOf({ name, is_angle: isAngle }, timeUnit) {
-  if (isAngle) return "°";
-  if (LENGTHS.includes(name)) return "m";
-  if (["over", "seconds", "t", "shift_time", "flight"].includes(name)) return timeUnit;
-  if (["roll", "pitch", "yaw", "angle", "turn", "hip", "thigh", "calf"].includes(name)) return "rad";
-  return "";
 }
 
 // What an argument is at first when it is added; angles in degrees.

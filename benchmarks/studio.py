@@ -1,0 +1,156 @@
+"""``python -m benchmarks studio``: how soon the page of the studio shows what a hand does.
+
+A seed is a motion that nobody has tuned to: moves drawn at random, until it is long enough. In a
+headless Chromium the pointer drags the ends of its bars; an edit is one move of the pointer, and it
+has arrived when page, bars and verdict are those of the new text. The 3D view is not drawn: in
+software a frame takes longer than all of the rest. Wants an idle machine.
+"""
+
+import tempfile
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.command import Benchmark
+from benchmarks.study import Study, TrialResult
+from controller.sweeps.trials import Trial
+from tests.live_preview import LivePreview
+from tests.viz.replay.browsing import Tab, chromium
+
+EDITS, EDITS_A_DRAG = 200, 20
+LENGTHS = (10, 30, 60)  # [s]
+REACH = 25  # px to either side of where the end of a bar is taken
+MOVES = (
+    ".body(z={z:.3f}, pitch={angle:.3f}, over={over:.2f})",
+    ".body(yaw={angle:.3f}, over={over:.2f}).home(over=0.6)",
+    '.foot("{leg}", z={up:.3f}, over={over:.2f}).down("{leg}", over=0.5)',
+    ".hold({over:.2f}).home(over=0.6)",
+)
+STEPS = (
+    '.home(over=0.6).step("{leg}", {ahead:.3f}, over={over:.2f})',
+    ".home(over=0.6).walk({ahead:.3f}, gait='trot')",
+)
+HEAD = '''"""One of many."""
+
+from motions import Timeline, motion
+
+
+@motion
+def drawn() -> Timeline:
+    """Drawn."""
+    line = Timeline()
+'''
+SETTLED = "!studio.isBusy && !studio.waiting"
+WATCH = """(() => {
+  window.waits = [];
+  window.addEventListener("pointermove", () => { window.moved = performance.now(); }, true);
+  const shown = studio.redrawDraft.bind(studio);
+  studio.redrawDraft = (draft) => { shown(draft); waits.push(performance.now() - moved); };
+})()"""
+ROWS = {
+    "plain": lambda seconds: (
+        ("median", "pointer to page, median", "ms"),
+        ("p95", "pointer to page, p95", f"<= {150 if seconds == LENGTHS[-1] else 120} ms"),
+        ("cpu", "server's processor time, mean", "<= 45 ms"),
+    ),
+    "steps": lambda _: (
+        ("median", "pointer to page, median", "ms"),
+        ("p95", "pointer to page, p95", "ms"),
+        ("cpu", "server's processor time, mean", "<= 60 ms"),
+    ),
+}
+
+
+def drawn(seed: int, seconds: float, kind: str) -> str:
+    """The text of a motion of about this length; ``kind`` "steps" has steps and trots, too."""
+    rng = np.random.default_rng([seed, int(seconds)])
+    moves, lines, length = (*MOVES, *STEPS) if kind == "steps" else MOVES, list[str](), 0.0
+    while length < seconds - 2.0:
+        move, over = str(rng.choice(moves)), rng.uniform(0.4, 1.2)
+        values = {
+            "z": rng.uniform(-0.04, 0.01),
+            "angle": rng.uniform(-0.12, 0.12),
+            "up": rng.uniform(0.05, 0.12),
+            "ahead": rng.uniform(0.04, 0.2),
+            "over": over,
+            "leg": str(rng.choice(["FL", "FR", "RL", "RR"])),
+        }
+        lines.append(f"    line = line{move.format(**values)}\n")
+        length += over + (0.6 if "home" in move else 0.0) + (2.0 if "walk" in move else 0.0)
+        length += 1.7 if "foot" in move or "step" in move else 0.0  # shifts before, and down
+    body = "".join(lines)
+    return f"{HEAD}{body}    return line.home(over=0.8)\n"
+
+
+def processor_time(process: int) -> float:
+    """What a process and its children have used [s], in steps of 0.01 s."""
+    stat = Path(f"/proc/{process}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+    children = Path(f"/proc/{process}/task/{process}/children").read_text(encoding="ascii")
+    used = (int(stat[11]) + int(stat[12])) / 100.0
+    return used + sum(processor_time(int(child)) for child in children.split())
+
+
+def measure(trial: Trial, found: TrialResult, seconds: int, kind: str) -> None:
+    """Drag the ends of bars of a motion, and wait each time for what comes of it."""
+    rng = np.random.default_rng([trial.seed, seconds, 1])
+    with tempfile.TemporaryDirectory() as folder, chromium() as browser:
+        file = Path(folder) / "drawn.py"
+        file.write_text(drawn(trial.seed, seconds, kind), encoding="utf-8")
+        with LivePreview(str(file), command="studio") as opened, Tab(browser) as tab:
+            tab.open(opened.url)
+            tab.wait_for("window.studio && replay.version")
+            tab.evaluate("studio.tour.end()")
+            tab.evaluate(WATCH)
+            before = processor_time(opened.process_id)
+            for _ in range(EDITS // EDITS_A_DRAG):
+                drag(tab, rng)
+            used = processor_time(opened.process_id) - before
+            waits = np.array(tab.evaluate("waits"))
+            found.notes["length"] = f"{tab.evaluate('replay.data.duration'):.1f} s"
+            found.notes["edits"] = str(len(waits))
+    saves = EDITS // EDITS_A_DRAG  # each is one run more
+    found.values["median"] = float(np.median(waits))
+    found.values["p95"] = float(np.quantile(waits, 0.95))
+    found.values["cpu"] = 1000.0 * used / (len(waits) + saves)
+
+
+def drag(tab: Tab, rng: np.random.Generator) -> None:
+    """Drag the end of one bar to and fro, and leave it where it was."""
+    edges = tab.page.locator(".bar:not(.foreign) em")
+    edge = edges.nth(int(rng.integers(edges.count())))
+    box = edge.bounding_box() or {}
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    tab.page.mouse.move(x, y)
+    tab.page.mouse.down()
+    for offset in rng.integers(4, REACH, EDITS_A_DRAG - 1).tolist():
+        count = tab.evaluate("waits.length")
+        tab.page.mouse.move(x + offset, y)
+        tab.wait_for(
+            f"(waits.length > {count} || studio.tools.say.className === 'bad') && {SETTLED}"
+        )
+    tab.page.mouse.move(x, y)
+    tab.page.mouse.up()
+    tab.wait_for(SETTLED)
+
+
+WORDS = {"plain": "paws and trunk", "steps": "steps and trots, too"}
+STUDIES = tuple(
+    Study(
+        f"{kind}-{seconds}",
+        {f"{seconds} s of {WORDS[kind]}": rows(seconds)},
+        partial(measure, seconds=seconds, kind=kind),
+        sensors=None,
+    )
+    for kind, rows in ROWS.items()
+    for seconds in LENGTHS
+)
+BENCHMARK = Benchmark(
+    name="studio",
+    description="How soon the studio's page shows what a hand does, in a headless Chromium.",
+    studies=STUDIES,
+    takes="about ten minutes",
+    examples=("plain-10 --runs 3", "--json --out studio.json"),
+    runs=1,
+)
+run = BENCHMARK.run

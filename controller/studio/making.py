@@ -1,0 +1,100 @@
+"""Runs an author's file, with the modules beside it, and takes its calls apart from the motion."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import final
+
+from controller.studio.orders import Order
+from go2_wbc.curves import Ease
+from motions import Motion, Timeline
+from motions.authoring import Value
+from motions.language.keys import Key, OwnEase
+from motions.language.tracing import CallMark, separated, traced
+from motions.plan.parts import rests
+from motions.registry import load_text
+
+RANDOM = "The file draws random numbers: bars jump at each change. Seed them in the file."
+WHOLE = (
+    "The motion never rests at home: each change has all of it checked again, which takes longer."
+)
+LONG = 10.0  #: Time [s] from which on that is told
+PACKAGES = frozenset({"site-packages", "dist-packages"})  #: Folders of what others have written
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """What came of running a file."""
+
+    motion: Motion
+    names: tuple[str, ...]  #: of all motions of the file
+    values: Mapping[str, Value]  #: of its parameters
+    line: Timeline
+    marks: tuple[CallMark, ...]  #: of its calls
+    notes: tuple[str, ...]  #: what is to be known of it, in words
+
+
+@final
+class Maker:
+    """Makes the motions of files; what they import from beside them is read anew if it changes."""
+
+    def __init__(self) -> None:
+        self._is_random = dict[tuple[Path, str], bool]()
+        self._read = dict[str, int]()
+
+    def make(self, order: Order) -> Made:
+        """Run the text; raises TimelineError if it is no motion, says the line."""
+        folder = str(order.path.parent)
+        if folder not in sys.path:
+            sys.path.insert(0, folder)
+        sys.dont_write_bytecode = True  # of two saves within a second the first would stay
+        self._forget_changed(order.path.parent)
+        made = self._made(order)
+        self._read = _written(order.path.parent)
+        which = order.path, made.motion.name
+        if which not in self._is_random:
+            self._is_random[which] = _moves(made.line) != _moves(self._made(order).line)
+        notes = [RANDOM] if self._is_random[which] else []
+        if made.line.end > LONG and not rests(made.line):
+            notes.append(WHOLE)
+        return replace(made, notes=tuple(notes))
+
+    def _made(self, order: Order) -> Made:
+        with traced():
+            own = load_text(order.path, order.data)
+            motion = own.get(order.chosen or "", next(iter(own.values())))
+            known = {item.name for item in motion.parameters}
+            values = {name: value for name, value in order.values.items() if name in known}
+            line, marks = separated(motion(**values))
+        if not line.keys:  # begun, and nothing written yet: it stands
+            line = line.body(z=0.0, over=1.0)
+        return Made(motion, tuple(own), values, line, tuple(marks), ())
+
+    def _forget_changed(self, folder: Path) -> None:
+        """Have what is imported from ``folder`` read again if any of it was written meanwhile."""
+        if _written(folder) != self._read:
+            for name in _written(folder):
+                del sys.modules[name]
+
+
+def _written(folder: Path) -> dict[str, int]:
+    """When each module that was imported from a folder was written [ns]; 0 of one that is gone."""
+    found, start = dict[str, int](), f"{folder}{os.sep}"
+    for name, module in list(sys.modules.items()):
+        file = getattr(module, "__file__", None) or ""
+        if file.startswith(start) and not PACKAGES & {*Path(file).parts}:
+            path = Path(file)
+            found[name] = path.stat().st_mtime_ns if path.exists() else 0
+    return found
+
+
+def _moves(line: Timeline) -> list[Key]:
+    """Its keys; functions of its own are other ones in every run."""
+    return [
+        replace(key, ease=Ease.LINEAR) if isinstance(key.ease, OwnEase) else key
+        for key in line.keys
+    ]

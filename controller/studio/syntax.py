@@ -1,0 +1,111 @@
+"""An author's file as a tree, and where each part of it stands: spans of bytes."""
+
+from __future__ import annotations
+
+import ast
+import re
+from bisect import bisect_right
+from collections.abc import Iterator
+from functools import cached_property
+
+from go2_wbc.errors import StudioError
+
+Site = tuple[int, int]  #: line from 1 and column [bytes] from 0 at which a call ends
+Span = tuple[int, int]  #: first byte, and the first after it
+
+
+class Syntax:
+    """The tree of a text.
+
+    Attributes:
+        data: the bytes of the text.
+        tree: of the module.
+        starts: where each line starts.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        """Read it.
+
+        Raises:
+            StudioError: if it is not Python; says the line.
+        """
+        self.data = data
+        try:
+            self.tree = ast.parse(data)
+        except (SyntaxError, ValueError) as error:
+            line = f"line {error.lineno}: " if isinstance(error, SyntaxError) else ""
+            raise StudioError(f"{line}{error.args[0]}") from error
+        bom = 3 if data.startswith(b"\xef\xbb\xbf") else 0
+        ends = [match.end() for match in re.finditer(rb"\r\n|\r|\n", data)]
+        self.starts = [bom, *ends]
+
+    @cached_property
+    def nodes(self) -> list[ast.AST]:
+        """All of them."""
+        return list(ast.walk(self.tree))
+
+    @cached_property
+    def parents(self) -> dict[ast.AST, ast.AST]:
+        """What each is in."""
+        return {child: node for node in self.nodes for child in ast.iter_child_nodes(node)}
+
+    @cached_property
+    def _calls(self) -> dict[tuple[int | None, int | None], ast.Call]:
+        calls = [node for node in self.nodes if isinstance(node, ast.Call)]
+        return {(call.end_lineno, call.end_col_offset): call for call in calls}
+
+    def call(self, site: Site) -> ast.Call:
+        """The call that ends there; raises StudioError if none does."""
+        if site not in self._calls:
+            raise StudioError(f"no call ends in line {site[0]}: the file has changed")
+        return self._calls[site]
+
+    def site(self, end: int) -> Site:
+        """Line and column of a byte."""
+        line = bisect_right(self.starts, end)
+        return line, end - self.starts[line - 1]
+
+    def around(self, node: ast.AST) -> Iterator[ast.AST]:
+        """What it is in, the innermost first."""
+        while (node := self.parents.get(node, self.tree)) is not self.tree:
+            yield node
+
+    def statement(self, node: ast.AST) -> ast.stmt:
+        """The statement that it is in."""
+        while not isinstance(node, ast.stmt):
+            node = self.parents[node]
+        return node
+
+    def span(self, node: ast.expr | ast.stmt) -> Span:
+        """Where it stands."""
+        start = self.starts[node.lineno - 1] + node.col_offset
+        return start, self.starts[(node.end_lineno or 1) - 1] + (node.end_col_offset or 0)
+
+    def text(self, span: Span) -> str:
+        """What stands there."""
+        return self.data[slice(*span)].decode()
+
+    def node(self, node: ast.expr) -> str:
+        """Its text."""
+        return self.text(self.span(node))
+
+    def name(self, call: ast.Call) -> str:
+        """Of the function or method that is called."""
+        return call.func.attr if isinstance(call.func, ast.Attribute) else self.node(call.func)
+
+    @property
+    def line_end(self) -> str:
+        """As the file has it."""
+        return "\r\n" if b"\r\n" in self.data else "\n"
+
+
+def value_of(node: ast.expr) -> float | str | None:
+    """The value of a literal number or word; None for anything else."""
+    is_signed = isinstance(node, ast.UnaryOp) and isinstance(node.operand, ast.Constant)
+    if not (is_signed or isinstance(node, ast.Constant)):
+        return None
+    try:
+        value = ast.literal_eval(node)
+    except (ValueError, TypeError):
+        return None
+    return value if isinstance(value, int | float | str) and not isinstance(value, bool) else None

@@ -1,0 +1,92 @@
+"""What was worked out of motions, kept for motions that are nearly the same.
+
+Most of what a check takes is work on single samples, and of an edited motion most samples are as
+they were, perhaps earlier or later. A ``Memory`` keeps it by what it was worked out of: a sample
+by its numbers, rounded to ``QUANTUM``, which is far below what any limit tells apart; a part that
+was compiled by its keys.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from typing import Any, TypeVar, final
+
+import numpy as np
+from jaxtyping import Float, Int
+
+QUANTUM = 1e-7
+"""What numbers are rounded to [m, rad and what is made of them]: times that are shifted change
+accelerations by 1e-11."""
+MOST_ROWS, MOST_PARTS = 40_000, 2_000  #: How many are kept of a kind; beyond that all are let go
+LEAST_ROOM = 1024  #: Rows that there is room for at first
+Rows = Int[np.ndarray, " rows"]
+Numbers = Float[np.ndarray, "n k"]
+Kept = TypeVar("Kept")
+
+
+class _Kind:
+    """Results of one kind."""
+
+    def __init__(self) -> None:
+        self.places = dict[int, int]()
+        self.count, self.values = 0, np.empty((0, 0))
+
+    def add(self, found: Numbers) -> Rows:
+        """Keep them; where they are."""
+        start, self.count = self.count, self.count + len(found)
+        if self.count > len(self.values):
+            room = np.empty((max(2 * self.count, LEAST_ROOM), found.shape[1]))
+            if start:
+                room[:start] = self.values[:start]
+            self.values = room
+        self.values[start : self.count] = found
+        return np.arange(start, self.count)
+
+
+@final
+class Memory:
+    """For one robot in one world."""
+
+    def __init__(self) -> None:
+        self._kinds = dict[Hashable, _Kind]()
+        self._parts = dict[Hashable, Any]()
+        self._factors = np.random.default_rng(0).integers(2**63, size=256, dtype=np.uint64) | 1
+
+    def part(self, key: Hashable, make: Callable[[], Kept]) -> Kept:
+        """What ``make`` gave for this key."""
+        if key not in self._parts:
+            if len(self._parts) >= MOST_PARTS:
+                self._parts.clear()
+            self._parts[key] = make()
+        return self._parts[key]
+
+    def rows(
+        self, name: Hashable, given: Numbers, work: Callable[[Rows], Numbers]
+    ) -> Float[np.ndarray, "n m"]:
+        """What ``work`` gives for these rows of ``given``, asked only for those that are new."""
+        kind, keys = self._kinds.setdefault(name, _Kind()), self._keys(given)
+        places = np.array([kind.places.get(key, -1) for key in keys])
+        new = np.flatnonzero(places < 0)
+        if len(new):
+            if kind.count + len(new) > MOST_ROWS:
+                self._kinds[name] = kind = _Kind()
+                new = np.arange(len(keys))
+            places[new] = kind.add(work(new))
+            kind.places.update((keys[row], int(places[row])) for row in new.tolist())
+        return kind.values[places]
+
+    def _keys(self, given: Numbers) -> list[int]:
+        """A number of 64 bits for every row: equal for equal ones, else it is a chance in 2^64."""
+        whole = np.rint(given / QUANTUM).astype(np.int64).view(np.uint64)
+        mixed = whole * self._factors[: whole.shape[1]]
+        mixed ^= mixed >> np.uint64(29)
+        return np.einsum("ij,j->i", mixed, self._factors[-whole.shape[1] :]).tolist()
+
+
+def by_rows(
+    memory: Memory | None, name: Hashable, given: Numbers, work: Callable[[Rows], Numbers]
+) -> Float[np.ndarray, "n m"]:
+    """``work`` on every row of ``given``, or with a ``memory`` on those that are new to it."""
+    if memory is None:
+        return work(np.arange(len(given)))
+    return memory.rows(name, given, work)

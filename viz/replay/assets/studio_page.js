@@ -1,0 +1,436 @@
+"use strict";
+// The studio on the page: what is done with bars and arguments goes to the server as an order, and
+// comes back as the motion that the file then makes. The page holds no motion of its own.
+
+const NUDGE = 0.05; // s, what a key makes a call longer or shorter
+const BEAT_NUDGE = 0.25; // beats, the same where the motion counts in beats
+const LIFT_AND_DOWN = "Lift and put down"; // of the palette, two calls
+const SLOWER = 1.2; // what the whole is slowed down by at first, where that is asked for
+const SNAP = 8; // px, a bar that ends this near a beat ends on it
+
+class Studio {
+  constructor(player) {
+    this.player = player;
+    this.selected = null; // place in `bars` of the bar that is edited
+    this.chosen = new Set(); // places of all that are moved, copied or deleted together
+    this.isBusy = false;
+    this.waiting = null; // the order that is sent when the answer is there; the last one wins
+    document.getElementById("app").classList.add("studio");
+    this.view = new TimeView(player, () => this.drawTime());
+    this.tracks = new Tracks(this, this.view);
+    this.music = new Music(this);
+    this.tools = new Tools(this);
+    this.inspector = new Inspector(this);
+    this.hands = new Hands(this);
+    document.getElementById("timeline").before(this.tools.box, this.music.box, this.tracks.box, this.view.box);
+    document.getElementById("sliders").before(this.inspector.box);
+    this.charts = player.charts.filter(({ canvas }) => canvas.closest("footer"));
+    for (const chart of this.charts) {
+      chart.view = this.view;
+      chart.left = LANE_LEFT;
+      this.view.listen(chart.canvas, LANE_LEFT, LANE_RIGHT);
+    }
+    player.charts.push(this);
+    window.addEventListener("keydown", (event) => this.onKey(event), true);
+    window.studio = this; // for scripts and tests
+    this.use(player.data.header.editor);
+    this.tour = new Tour(this);
+  }
+
+  // Shows what is saved, or what the player has got; calls that were just changed or made are chosen.
+  use(editor, site = null) {
+    if (!editor?.bars) return; // the player's data, as a chart of it: see `show`
+    const isOther = this.editor && this.editor.motion !== editor.motion;
+    this.editor = editor;
+    const found = site ? editor.bars.findIndex((bar) => isAt(bar, site)) : -1;
+    if (found >= 0) this.choose(this.around(found));
+    else if (isOther) this.choose([]);
+    else this.choose([...this.chosen].filter((index) => editor.bars[index]));
+    if (isOther) this.view.fit();
+    this.redraw();
+  }
+
+  // As the player's charts.
+  show(t) {
+    if (this.player.isPlaying) this.view.follow(t);
+    this.tracks.show(t);
+    this.music.show(t);
+    this.hands.show(t);
+  }
+
+  onScrub() {}
+
+  redraw() {
+    const { editor } = this;
+    this.view.use();
+    this.tools.use(editor, this.player.data.header);
+    this.tracks.use(this.player.data, editor);
+    this.music.use(editor);
+    this.inspector.use(this.bar(), editor, this.timeUnit, this.chosen.size);
+    this.hands.use();
+  }
+
+  drawTime() {
+    for (const chart of this.charts) chart.redraw();
+    this.tracks.draw();
+    this.music.draw();
+  }
+
+  get timeUnit() {
+    return this.player.data.header.beats.length > 1 ? "beats" : "s";
+  }
+
+  // What lies on the grid: the beats that the motion counts in, or those of the music.
+  get beats() {
+    const { beats } = this.player.data.header;
+    return beats.length > 1 ? beats : this.music.beats;
+  }
+
+  bar() {
+    return this.selected === null ? null : this.editor.bars[this.selected] ?? null;
+  }
+
+  own() {
+    return [...this.chosen].sort((a, b) => a - b).map((index) => this.editor.bars[index]).filter(isOwn);
+  }
+
+  choose(indexes) {
+    this.chosen = new Set(indexes);
+    if (!this.chosen.has(this.selected)) this.selected = indexes[indexes.length - 1] ?? null;
+  }
+
+  // What the hand is at is what the inspector shows; the picture stays where it is.
+  take(index) {
+    if (!this.chosen.has(index)) this.choose([index]);
+    this.selected = index;
+    this.inspector.use(this.bar(), this.editor, this.timeUnit, this.chosen.size);
+  }
+
+  // `how` "more" adds a bar to what is chosen, or takes it out.
+  select(index, how = "") {
+    if (how === "more" && this.chosen.has(index) && this.chosen.size > 1) {
+      this.chosen.delete(index);
+      this.choose([...this.chosen]);
+    } else {
+      this.chosen = new Set(how === "more" ? [...this.chosen, index] : [index]);
+      this.selected = index;
+    }
+    this.player.scrub(this.editor.bars[this.selected].span[2]);
+    this.redraw();
+    this.inspector.box.parentElement.scrollTop = 0;
+  }
+
+  // All from one bar to the next, in time.
+  extend(from, to) {
+    this.chosen.add(from);
+    if (this.chosen.has(to)) this.chosen.delete(from);
+    this.chosen.add(to);
+    this.selected = to;
+    this.redraw();
+  }
+
+  all() {
+    this.choose(this.editor.bars.map((_, index) => index));
+    this.redraw();
+  }
+
+  // How many bars from `found` on were changed or made by the last order.
+  around(found) {
+    const { count = 1, isLast, back = 0 } = this.made ?? {};
+    const first = (isLast ? found - count + 1 : found) - back;
+    return Array.from({ length: count }, (_, k) => first + k).filter((index) => this.editor.bars[index]);
+  }
+
+  act(op) {
+    if (op === "undo" || op === "redo") return this.send({ op }, true);
+    const bars = this.own();
+    const sites = [...new Map(bars.map((bar) => [String(bar.site), bar.site])).values()];
+    if (!sites.length) return null;
+    const step = { earlier: -1, later: 1 }[op];
+    if (step) return this.move(this.order().place + step);
+    this.made = { count: op === "delete" ? 0 : sites.length, isLast: true };
+    const last = sites[sites.length - 1];
+    if (op === "duplicate" && sites.length > 1) return this.send({ op: "copies", sites, site: last }, true);
+    const orders = sites.map((site) => ({ op, site }));
+    return this.send(orders.length > 1 ? { op: "many", orders } : orders[0], true);
+  }
+
+  // The calls of the file that are not chosen, by their starts, and before which of them the chosen are.
+  order() {
+    const sites = new Set(this.own().map((bar) => String(bar.site)));
+    const known = new Set();
+    const bars = this.editor.bars.filter((bar) => isOwn(bar) && !known.has(String(bar.site)) && known.add(String(bar.site)));
+    const others = bars.filter((bar) => !sites.has(String(bar.site)));
+    const first = bars.findIndex((bar) => sites.has(String(bar.site)));
+    return { others, place: bars.slice(0, Math.max(first, 0)).filter((bar) => others.includes(bar)).length, sites: bars.filter((bar) => !others.includes(bar)).map((bar) => bar.site) };
+  }
+
+  // What is chosen goes before the `place`-th of the others.
+  move(place) {
+    const { others, place: was, sites } = this.order();
+    if (place === was || place < 0 || place > others.length || !others.length) return;
+    this.made = { count: sites.length, isLast: true };
+    const step = Math.abs(place - was) === 1 ? place - was : 0;
+    const target = others[Math.max(place - 1, 0)].site;
+    this.send({ op: "move", sites, site: target, step, is_ahead: place === 0 }, true);
+  }
+
+  async copy(isCut = false) {
+    const sites = this.own().map((bar) => bar.site);
+    if (!sites.length) return;
+    this.copied = sites.length;
+    const answer = await this.ask("copy", "copying…", { sites });
+    if (answer.told) this.tell(answer.told);
+    if (answer.told && isCut) this.act("delete");
+  }
+
+  paste() {
+    const site = this.placeOfNew();
+    this.made = { count: this.copied ?? 1, isLast: true };
+    if (site) this.send({ op: "paste", site }, true);
+  }
+
+  // A move of the palette; `values` are arguments that differ from what it has at first.
+  insert(title, values = {}) {
+    const site = this.placeOfNew();
+    this.made = { count: 1, back: title === LIFT_AND_DOWN ? 1 : 0 };
+    this.send(site ? { op: "insert", site, title, values } : { op: "begin", title }, true);
+  }
+
+  // The call behind which something new is put: the chosen one, else the last.
+  placeOfNew() {
+    const { bars } = this.editor;
+    if (isOwn(this.bar())) return this.bar().site;
+    const own = bars.filter(isOwn).sort((a, b) => a.span[2] - b.span[2]);
+    return own[own.length - 1]?.site;
+  }
+
+  // What else can be done with a call, such as writing out its loop: orders with their titles.
+  async offers({ site, number }) {
+    const { offers = [] } = await this.post("edit", { op: "offers", site, number, base: this.editor.base });
+    return offers.map(({ title, ...order }) => ({
+      text: title, hint: "changes the file; Undo takes it back", act: () => this.rewrite({ value: SLOWER, ...order, site, number }),
+    }));
+  }
+
+  rewrite(order) {
+    this.made = { count: 1 };
+    this.inspector.forget();
+    this.send(order, true);
+  }
+
+  // A number or word for an argument of the chosen call; a draft is shown, but not saved. Jumps are
+  // solved, which takes up to half a minute: only when they are let go.
+  set(bar, name, value, isCommitted) {
+    this.setMany(bar, { [name]: value }, isCommitted);
+  }
+
+  setMany(bar, values, isCommitted) {
+    this.inspector.follow(values);
+    if (!isCommitted && bar.parts.includes("robot")) return;
+    const { site, number } = bar;
+    const entries = Object.entries(values);
+    this.made = { count: 1 };
+    if (entries.length > 1) this.send({ op: "set_many", site, number, values }, isCommitted);
+    else this.send({ op: "set", site, number, name: entries[0][0], value: entries[0][1] }, isCommitted);
+  }
+
+  // All that is chosen, by one step of the clock.
+  lengthen(side) {
+    const nudge = this.timeUnit === "beats" ? BEAT_NUDGE : NUDGE;
+    const orders = this.own().filter(lengthOf).map((bar) => {
+      const { name, value } = lengthOf(bar);
+      return { op: "set", site: bar.site, number: bar.number, name, value: Math.max(rounded(value + side * nudge, nudge), nudge) };
+    });
+    this.made = { count: orders.length, isLast: false };
+    if (orders.length) this.send(orders.length > 1 ? { op: "many", orders } : orders[0], true);
+  }
+
+  // The argument with which a call ends at `end` [s], or on a beat at most `room` [s] away.
+  durationFor(bar, end, room) {
+    const beat = this.beats.find((one) => Math.abs(one - end) < room);
+    const nudge = this.timeUnit === "beats" ? BEAT_NUDGE : NUDGE;
+    const exact = ratio(bar) * ((beat ?? end) - bar.span[1]);
+    const isOff = this.timeUnit === "s" && beat !== undefined; // the song's beats fit no step
+    return Math.max(isOff ? Math.round(1000 * exact) / 1000 : rounded(exact, nudge), nudge);
+  }
+
+  async send(order, isCommitted) {
+    if (this.isBusy) {
+      if (!this.waiting || !this.waiting.isCommitted || isCommitted) this.waiting = { order, isCommitted };
+      return;
+    }
+    this.isBusy = true;
+    this.tools.offer([]);
+    this.tell(isCommitted ? "saving…" : "checking…");
+    const asked = performance.now();
+    const answer = await this.post("edit", { ...order, base: this.editor.base, commit: isCommitted });
+    if (answer.data) {
+      this.player.use(new ReplayData(await unpack(answer.data), this.player.data.scene));
+      this.redrawDraft(this.player.data.header.editor);
+      this.took = performance.now() - asked; // ms, for scripts that measure
+    }
+    this.tell(answer.error ?? (isCommitted ? "saved" : "not saved yet"), Boolean(answer.error));
+    if (answer.error) this.inspector.forget();
+    if (answer.error || isCommitted) await this.reload(answer.site);
+    if (answer.site && !order.op.startsWith("set") && this.selected !== null && this.chosen.size === 1) this.select(this.selected);
+    this.tracks.refocus(this.selected);
+    this.isBusy = false;
+    if (this.waiting) {
+      const next = this.waiting;
+      this.waiting = null;
+      this.send(next.order, next.isCommitted);
+    }
+  }
+
+  async post(path, order) {
+    try {
+      const headers = { "Content-Type": "application/json" };
+      const answer = await fetch(`${path}${location.search}`, { method: "POST", headers, body: JSON.stringify(order) });
+      return await answer.json();
+    } catch {
+      return { error: "The studio has ended: nothing was saved." };
+    }
+  }
+
+  // What the server shows now: after a save, or instead of a draft that was refused.
+  async reload(site) {
+    let answer;
+    try {
+      answer = await fetch(`data${location.search}`);
+    } catch {
+      return;
+    }
+    this.player.use(new ReplayData(await unpack(await answer.text()), this.player.data.scene));
+    this.use(this.player.data.header.editor, site);
+  }
+
+  // A draft moves bars; their places in the file are those of what is saved.
+  redrawDraft(draft) {
+    if (draft.bars.length !== this.editor.bars.length) return;
+    this.view.use();
+    const bars = draft.bars.map((bar, index) => ({ ...bar, site: this.editor.bars[index].site }));
+    this.tracks.use(this.player.data, { ...this.editor, bars });
+    this.hands.use(bars[this.selected]);
+  }
+
+  // The motion that is saved, as MuJoCo plays it; the next edit shows the plan again.
+  async play() {
+    const answer = await this.ask("play", "playing in MuJoCo…");
+    if (!answer.data) return;
+    this.player.use(new ReplayData(await unpack(answer.data), this.player.data.scene));
+    this.tell("");
+    document.getElementById("who").prepend(element("b", {
+      textContent: `${answer.told}. `, className: answer.told.startsWith("NOT") ? "bad" : "",
+    }));
+    this.player.play(true);
+  }
+
+  async mend() {
+    const { changes } = await this.ask("mend", "looking for changes…");
+    if (!changes) return;
+    this.tell(changes.length ? "one click, and the robot can do it:" : "no change of tempo, size or height is enough", !changes.length);
+    this.tools.offer(changes.map(([call, meaning], which) => ({
+      text: meaning, hint: `appends ${call}`, act: () => this.send({ op: "change", which }, true),
+    })));
+  }
+
+  async export(kind) {
+    let answer = await this.ask("export", "writing…", { kind });
+    if (answer.exists && window.confirm(`${answer.exists} is there already: write over it?`)) {
+      answer = await this.ask("export", "writing…", { kind, again: true });
+    }
+    this.tell(answer.told ?? answer.error ?? "nothing was written", Boolean(answer.error));
+  }
+
+  // Another motion of the file; what was copied can be pasted there.
+  async open(motion) {
+    const answer = await this.ask("choose", `opening ${motion}…`, { motion });
+    if (answer.error) return;
+    this.tell("");
+    await this.reload();
+  }
+
+  // An answer that takes seconds; edits go on meanwhile.
+  async ask(what, text, order = {}) {
+    const button = this.tools.box.querySelector(`[data-ask=${what}]`) ?? {};
+    button.disabled = true;
+    this.tell(text);
+    const answer = await this.post(what, order);
+    button.disabled = false;
+    if (answer.error) this.tell(answer.error, true);
+    return answer;
+  }
+
+  tell(text, isBad = false) {
+    this.tools.tell(text, isBad);
+  }
+
+  // Back to what is saved, nothing chosen.
+  giveUp() {
+    this.choose([]);
+    this.waiting = null;
+    this.inspector.giveUp();
+    if (this.tools.told === "not saved yet") this.tell("as it is saved");
+    this.reload();
+  }
+
+  onKey(event) {
+    const key = event.key.toLowerCase();
+    const isTyping = event.target.matches("input, select, textarea");
+    const isCommand = event.ctrlKey || event.metaKey;
+    if (document.querySelector("dialog[open]")) return;
+    if (event.key === "Escape" && this.selected !== null) return void this.giveUp();
+    if (isTyping || (!isCommand && event.altKey)) return;
+    const bare = {
+      b: () => this.play(), "+": () => this.view.zoom(ZOOM_STEP), "=": () => this.view.zoom(ZOOM_STEP),
+      "-": () => this.view.zoom(1 / ZOOM_STEP), 0: () => this.view.fit(), z: () => this.zoomToChosen(),
+      t: () => this.music.tap(), i: () => this.tools.focus("Insert a move"), "?": () => this.tools.help(),
+      e: () => this.inspector.focus(), l: () => this.focusBars(),
+    };
+    const commanded = {
+      z: () => this.act(event.shiftKey ? "redo" : "undo"), y: () => this.act("redo"), a: () => this.all(),
+      c: () => this.copy(), x: () => this.copy(true), v: () => this.paste(),
+    };
+    const act = (isCommand ? commanded : bare)[key];
+    if (!act || (isCommand && key === "c" && !this.chosen.size)) return;
+    act();
+    event.preventDefault();
+    event.stopPropagation();
+  }
+
+  focusBars() {
+    this.tracks.reveal(this.selected ?? 0);
+  }
+
+  zoomToChosen() {
+    const spans = [...this.chosen].map((index) => this.editor.bars[index].span);
+    if (!spans.length) return;
+    this.view.show([Math.min(...spans.map(([start]) => start)), Math.max(...spans.map((span) => span[2]))]);
+  }
+}
+
+// Whether a call stands in the file that is open.
+function isOwn(bar) {
+  return Boolean(bar) && bar.site[0] > 0;
+}
+
+function isAt(bar, site) {
+  return bar.site[0] === site[0] && bar.site[1] === site[1];
+}
+
+// The argument that says how long a call lasts; of a walk without one, what it would say.
+function lengthOf(bar) {
+  const slot = bar.slots.find(({ name }) => ["over", "seconds"].includes(name));
+  if (slot) return slot.span ? slot : null;
+  const takes = bar.more.includes("over") && !bar.parts.includes("robot");
+  return takes ? { name: "over", value: bar.span[2] - bar.span[1] } : null;
+}
+
+function rounded(value, step) {
+  return Number((Math.round(value / step) * step).toFixed(6));
+}
+
+function element(kind, properties = {}) {
+  return Object.assign(document.createElement(kind), properties);
+}
