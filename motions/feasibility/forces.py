@@ -149,9 +149,7 @@ LOADED = 0.999  #: Share of its load from which on a foot counts as standing ful
 PRESSED = 10.0
 """Normal force [N] from which on the friction of a foot matters; below, the quotient is noise and
 a slip moves nothing (own choice, 6 % of the weight)."""
-STILL = 1e-5
-"""Joint speed [rad/s] below which a motor drives nothing: more than what splines ring by at rest,
-2e-6."""
+STILL = 1e-6  #: Joint speed [rad/s] below which a motor drives nothing: more than rounding, 1e-15
 NO_SUPPORT = 1.0
 """How far outside [m] of their support CoM and zero-moment point count when no foot stands."""
 _FEW = (2, 3)
