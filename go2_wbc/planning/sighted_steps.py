@@ -131,6 +131,19 @@ def calf_miss(
 
 
 @subroutine
+def lowering_miss(
+    m: HeightMap, hip: V3, goal: V3, drop: float, ahead: tuple[float, float], c: Walk
+) -> float:
+    """How much room [m] the calf of a foot lacks that comes down to ``goal`` by ``drop`` [m]."""
+    missing = 0.0
+    if drop > STEP:
+        for k in range(1, 3):
+            foot = (goal[0], goal[1], goal[2] + k / 3.0 * drop)
+            missing += calf_miss(m, hip, foot, ahead, BEHIND, c)
+    return missing
+
+
+@subroutine
 def choose(
     leg: int,
     now: Snapshot,
@@ -145,7 +158,7 @@ def choose(
 
     ``blind``: where it would come down by the plane; ``most``: how far [m] from where it is led.
     """
-    swing, step, yaw = s.feet[leg].swing, s.feet[leg].step, s.trunk.yaw
+    start, step, yaw = s.feet[leg].swing.start, s.feet[leg].step, s.trunk.yaw
     cosine, sine = np.cos(yaw), np.sin(yaw)
     v_x, v_y = world_velocity(s.trunk)
     climb = s.ground.slope[0] * v_x + s.ground.slope[1] * v_y
@@ -180,13 +193,8 @@ def choose(
             continue
         goal = (x, y, z + c.foot_radius)
         cost += MISS * leg_miss(m, at, way, goal, c)
-        if cost >= best:
-            continue
-        drop = swing.start[2] - goal[2]
-        if drop > STEP:
-            for k in range(1, 3):
-                lowered = (x, y, goal[2] + k / 3.0 * drop)
-                cost += LOWERING * calf_miss(m, before, lowered, ahead, BEHIND, c)
+        if cost < best:
+            cost += LOWERING * lowering_miss(m, before, goal, start[2] - goal[2], ahead, c)
         if cost < best:
             best = cost
             step.chosen[0], step.chosen[1] = x, y
