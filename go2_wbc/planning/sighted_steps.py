@@ -13,11 +13,11 @@ distance d, that costs least:
 stride must not send it to and fro. ``edge`` falls, as a square, through 1 at ``NEAR`` to 0 at
 ``NEAR_ENOUGH`` from the next cell that is lower by more than ``STEP``, or unknown, or a little
 nearer if it is higher; ``range`` is that of the heights of the cells around it. It is chosen anew
-until ``LATEST`` of the swing, and gone over to at ``SLEW``; later only its height follows. The
-last term keeps a foot on top of a high step until its hip has gone on: by 7 cm behind the edge the
-knee is still bent so far that the calf comes down on it, and the foot hangs in the air. The
-place that was chosen last may always be kept: the blind one swings aside with the trunk by 8 cm,
-and would drag it over an edge.
+until ``LATEST`` of the swing, and gone over to at ``SLEW``; later only its height follows. The last
+term keeps a foot on top of a high step until its hip has gone on: a hip 7 cm past the edge bends
+the knee so far that the calf comes down on it, and the foot hangs in the air. The place that was
+chosen last may always be kept: the blind one swings aside with the trunk by 8 cm, and would drag it
+over an edge.
 
 The swing goes up to a top over both of its ends and all that is between, and down; each part's time
 is by its height. It goes ahead between two moments, which are the nearest to the swing's begin and
