@@ -16,7 +16,7 @@ from controller.studio.orders import Answer, Bar, Order, Task
 from controller.studio.project import Project
 from controller.studio.rewriting import offers
 from controller.studio.running import Runner
-from controller.studio.songs import heard, songs_beside
+from controller.studio.songs import heard, songs_beside, sound_of
 from controller.studio.source import Source, parameters
 from controller.studio.together import copied, edited_together, pasted
 from go2_wbc.curves import Ease
@@ -208,7 +208,8 @@ class Studio:
     def export(self, order: Mapping[str, object]) -> dict[str, object]:
         """Write what is saved beside the file: ``kind`` is one of ``EXPORTS``.
 
-        A file that is there is written over only ``again``; "exists" asks for that.
+        A page has the ``song`` that is named. A file that is there is written over only ``again``;
+        "exists" asks for that.
         """
         kind = order.get("kind")
         if not isinstance(kind, str) or kind not in EXPORTS:
@@ -220,6 +221,9 @@ class Studio:
             shown = self._run(self._project.saved)
             content = replace(self._content(shown), editor=None)
             if kind == "html":
+                song = order.get("song")
+                if song in songs_beside(self._project.path):
+                    content = replace(content, sound=sound_of(path.with_name(str(song))))
                 viz.export_html(content, path, title=shown.title)
             else:
                 viz.export_animation(content, path, speed=1.0, fps=12.5)

@@ -17,6 +17,18 @@ def songs_beside(file: Path) -> list[str]:
     return sorted(path.name for path in file.parent.iterdir() if path.suffix.lower() in SUFFIXES)
 
 
+def sound_of(path: Path) -> bytes:
+    """A song as a page plays it, an MP3 file.
+
+    Raises:
+        CommandError: if it cannot be read.
+        MissingDependency: without the extra ``[music]``.
+    """
+    from motions.music.songs import mp3_of, read_sound
+
+    return mp3_of(read_sound(path))
+
+
 def heard(path: Path) -> dict[str, object]:
     """The beats of a song, its waveform and its sound, as for JSON.
 

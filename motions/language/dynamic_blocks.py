@@ -168,7 +168,7 @@ class DynamicBlocks(TimelineData):
         away = away_from_home(self, self.cursor)
         if away:
             raise TimelineError(
-                f"a dynamic block starts standing at home(); away: {', '.join(away)}"
+                f"a jump or flight starts standing at home(); away: {', '.join(away)}"
             )
         end = self.cursor + sum(phase.duration for phase in phases)
         return self._longer([PhaseKey(self.cursor, end, Ease.LINEAR, phases, is_open)], end)

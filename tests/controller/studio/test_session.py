@@ -6,10 +6,12 @@ import base64
 import gzip
 import json
 import time
+import wave
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from controller.studio import running
@@ -189,6 +191,21 @@ def test_what_is_exported_lies_beside_the_file(studio: Studio, file: Path) -> No
     assert studio.export({"kind": "html", "again": True}) == {"told": "wrote greet.html"}
     assert page.read_text(encoding="utf-8") == before
     assert "kind" in str(studio.export({"kind": "../../evil"})["error"])
+
+
+def test_an_exported_page_plays_the_song(studio: Studio, file: Path) -> None:
+    song = file.with_name("tune.wav")
+    with wave.open(str(song), "wb") as sound:
+        sound.setparams((1, 2, 22_050, 0, "NONE", ""))
+        noise = np.random.default_rng(0).integers(-9000, 9000, 22_050, dtype=np.int16)
+        sound.writeframes(noise.tobytes())
+    page, sizes = file.with_suffix(".html"), list[int]()
+    for name in (None, "tune.wav", "../tune.wav"):
+        assert "told" in studio.export({"kind": "html", "song": name, "again": True})
+        sizes.append(page.stat().st_size)
+    assert sizes[1] > sizes[0] + 2000
+    assert sizes[2] == sizes[0]
+    song.unlink()
 
 
 @pytest.mark.slow

@@ -135,6 +135,13 @@ def test_a_move_is_inserted_and_one_that_is_refused_is_told(tab: Tab, file: Path
     assert tab.evaluate("studio.selected") == 3, "still that one"
 
 
+def test_what_is_inserted_next_goes_behind_both_calls_of_a_pair(tab: Tab, file: Path) -> None:
+    for title in ("Lift and put down", "Pause"):
+        tab.page.get_by_label("Insert a move").select_option(title)
+        _settle(tab)
+    assert '.down("FR", over=0.5).hold(0.5)' in file.read_text(encoding="utf-8")
+
+
 def test_a_draft_is_given_up(tab: Tab, file: Path) -> None:
     tab.page.locator("[data-bar='0']").click()
     field = tab.page.locator("[data-slot=pitch]")

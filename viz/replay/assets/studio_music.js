@@ -16,11 +16,16 @@ class Music {
     this.list.addEventListener("change", () => this.choose(this.list.value));
     this.tapper = element("button", { textContent: "Tap", title: "Tap the tempo, four times or more (T)" });
     this.tapper.addEventListener("click", () => this.tap());
+    this.later = element("button", { textContent: "Bar +1", title: "Bars begin one beat later", hidden: true });
+    this.later.addEventListener("click", () => {
+      this.downbeat = (this.downbeat + 1) % this.metre;
+      this.draw();
+    });
     this.tempo = element("output", { id: "tempo" });
     this.buttons = element("div", { className: "buttons" });
     this.buttons.setAttribute("role", "group");
     this.buttons.setAttribute("aria-label", "Music and tempo");
-    this.buttons.append(this.list, this.tapper, this.tempo);
+    this.buttons.append(this.list, this.tapper, this.later, this.tempo);
     studio.view.listen(this.box, LANE_LEFT, LANE_RIGHT);
     new ResizeObserver(() => this.draw()).observe(this.box);
     this.box.addEventListener("pointerdown", (event) => {
@@ -101,7 +106,7 @@ class Music {
 
   draw() {
     const { view } = this.studio;
-    this.box.hidden = !this.song && !this.beats.length;
+    this.box.hidden = this.later.hidden = !this.song && !this.beats.length;
     if (this.box.hidden) {
       this.grid.remove();
       return;

@@ -43,7 +43,10 @@ class Studio {
     const isOther = this.editor && this.editor.motion !== editor.motion;
     this.editor = editor;
     const found = site ? editor.bars.findIndex((bar) => isAt(bar, site)) : -1;
-    if (found >= 0) this.choose(this.around(found));
+    if (found >= 0) {
+      this.choose(this.around(found));
+      if (this.made?.isFirst) this.selected = Math.min(...this.chosen);
+    }
     else if (isOther) this.choose([]);
     else this.choose([...this.chosen].filter((index) => editor.bars[index]));
     if (isOther) this.view.fit();
@@ -136,8 +139,8 @@ class Studio {
 
   // How many bars from `found` on were changed or made by the last order.
   around(found) {
-    const { count = 1, isLast, back = 0 } = this.made ?? {};
-    const first = (isLast ? found - count + 1 : found) - back;
+    const { count = 1, isLast } = this.made ?? {};
+    const first = isLast ? found - count + 1 : found;
     return Array.from({ length: count }, (_, k) => first + k).filter((index) => this.editor.bars[index]);
   }
 
@@ -193,14 +196,15 @@ class Studio {
   // A move of the palette; `values` are arguments that differ from what it has at first.
   insert(title, values = {}) {
     const site = this.placeOfNew();
-    this.made = { count: 1, back: title === LIFT_AND_DOWN ? 1 : 0 };
+    const isPair = title === LIFT_AND_DOWN; // the first of it is what is pulled
+    this.made = { count: isPair ? 2 : 1, isLast: true, isFirst: isPair };
     this.send(site ? { op: "insert", site, title, values } : { op: "begin", title }, true);
   }
 
-  // The call behind which something new is put: the chosen one, else the last.
+  // The call behind which something new is put: the last that is chosen, else the last of all.
   placeOfNew() {
-    const { bars } = this.editor;
-    if (isOwn(this.bar())) return this.bar().site;
+    const { bars } = this.editor, chosen = this.own();
+    if (chosen.length) return chosen[chosen.length - 1].site;
     const own = bars.filter(isOwn).sort((a, b) => a.span[2] - b.span[2]);
     return own[own.length - 1]?.site;
   }
@@ -336,9 +340,10 @@ class Studio {
   }
 
   async export(kind) {
-    let answer = await this.ask("export", "writing…", { kind });
+    const song = this.music.song?.name ?? null; // a film has no sound
+    let answer = await this.ask("export", "writing…", { kind, song });
     if (answer.exists && window.confirm(`${answer.exists} is there already: write over it?`)) {
-      answer = await this.ask("export", "writing…", { kind, again: true });
+      answer = await this.ask("export", "writing…", { kind, song, again: true });
     }
     this.tell(answer.told ?? answer.error ?? "nothing was written", Boolean(answer.error));
   }

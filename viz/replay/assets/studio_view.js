@@ -78,6 +78,7 @@ class TimeView {
 
   // Has time `t` in view, a page further if need be.
   follow(t) {
+    if (this.isWhole) return this.fit(); // what was measured may be longer than the plan
     if (t > this.from + this.length + 1e-6 || t < this.from - 1e-6) this.set(t - 0.1 * this.length, this.length);
   }
 
