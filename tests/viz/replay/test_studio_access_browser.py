@@ -10,7 +10,8 @@ import pytest
 
 from tests.live_preview import LivePreview
 from tests.viz.replay.browsing import Tab
-from tests.viz.replay.test_studio_hands_browser import DANCE, SETTLED
+from tests.viz.replay.studio_tab import SETTLED
+from tests.viz.replay.test_studio_hands_browser import DANCE
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser

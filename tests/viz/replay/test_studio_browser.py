@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.controller.studio.test_session import GREET
-from tests.live_preview import LivePreview
 from tests.viz.replay.browsing import Tab
+from tests.viz.replay.studio_tab import SETTLED, studio_tab, undo_all
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -28,33 +28,18 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def studio(file: Path, chromium_browser: Browser) -> Iterator[Tab]:
-    with LivePreview(str(file), command="studio") as opened, Tab(chromium_browser) as tab:
-        tab.open(opened.url)
-        tab.wait_for("window.studio && replay.version")
+    with studio_tab(file, chromium_browser) as tab:
         for _ in range(4):  # who opens it first is shown around
             tab.page.get_by_role("button", name="Next").click()
         tab.page.get_by_role("button", name="Done").click()
         yield tab
-        assert tab.complaints == []
-        assert all(url.startswith(opened.url.partition("?")[0]) for url in tab.requested)
 
 
 @pytest.fixture
 def tab(studio: Tab, file: Path) -> Iterator[Tab]:
     """The page, its file as it was at first; undone, it is so again."""
     yield studio
-    while studio.evaluate("studio.editor.undo"):
-        _do(studio, "studio.act('undo')")
-    assert file.read_text(encoding="utf-8") == GREET
-
-
-def _do(tab: Tab, gesture: str) -> None:
-    tab.evaluate(gesture)
-    _settle(tab)
-
-
-def _settle(tab: Tab) -> None:
-    tab.wait_for("!studio.isBusy && !studio.waiting")
+    undo_all(studio, file, GREET)
 
 
 def _bar(tab: Tab, index: int) -> dict[str, Any]:
@@ -74,7 +59,7 @@ def test_an_edge_is_dragged(tab: Tab, file: Path) -> None:
     mouse.move(right - 3 + 0.3 * second, middle, steps=2)
     mouse.up()
     tab.wait_for(f"{SAID} === 'saved'")
-    _settle(tab)
+    tab.wait_for(SETTLED)
     assert file.read_text(encoding="utf-8") == GREET.replace("(10.0), over=0.6", "(10.0), over=0.9")
     assert _bar(tab, 1)["x"] > right + 0.2 * second, "what follows comes later"
 
@@ -89,7 +74,7 @@ def test_a_number_is_typed_and_a_broken_limit_is_red(tab: Tab, file: Path) -> No
     field.press("Enter")
     assert tab.evaluate("replay.scene.viewer.camera.position.toArray()") == view
     tab.wait_for("document.querySelector('[data-bar=\"0\"]').classList.contains('broken')")
-    _settle(tab)
+    tab.wait_for(SETTLED)
     assert "pitch=deg(41.2)" in file.read_text(encoding="utf-8")
     assert "broken" in tab.text("#badge")
     assert tab.evaluate("replay.time") == pytest.approx(0.6), "the pose it leads to is shown"
@@ -97,7 +82,7 @@ def test_a_number_is_typed_and_a_broken_limit_is_red(tab: Tab, file: Path) -> No
     tab.wait_for("document.querySelectorAll('#studio-changes button').length > 0")
     tab.click("#studio-changes button")
     tab.wait_for("document.getElementById('badge').textContent.startsWith('feasible')")
-    _settle(tab)
+    tab.wait_for(SETTLED)
 
 
 def test_keys_reach_every_bar(tab: Tab, file: Path) -> None:
@@ -112,10 +97,10 @@ def test_keys_reach_every_bar(tab: Tab, file: Path) -> None:
     ):
         tab.page.locator("[data-bar='1']").focus()
         keys.press(press)
-        _settle(tab)
+        tab.wait_for(SETTLED)
         assert file.read_text(encoding="utf-8") == changed
         keys.press("Control+z")
-        _settle(tab)
+        tab.wait_for(SETTLED)
         assert file.read_text(encoding="utf-8") == GREET
 
 
@@ -123,14 +108,14 @@ def test_a_move_is_inserted_and_one_that_is_refused_is_told(tab: Tab, file: Path
     tab.page.locator("[data-bar='0']").click()
     tab.page.get_by_label("Insert a move").select_option("Pause")
     tab.wait_for(f"{SAID} === 'saved'")
-    _settle(tab)
+    tab.wait_for(SETTLED)
     assert "(10.0), over=0.6).hold(0.5).home" in file.read_text(encoding="utf-8")
     assert tab.evaluate("studio.bar().name") == "hold", "what was made is chosen"
     before = file.read_text(encoding="utf-8")
     tab.page.locator("[data-bar='3']").click()
     tab.click("[data-op=delete]")
     tab.wait_for(f"{SAID}.includes('foot FR is not raised')")
-    _settle(tab)
+    tab.wait_for(SETTLED)
     assert file.read_text(encoding="utf-8") == before
     assert tab.evaluate("studio.selected") == 3, "still that one"
 
@@ -138,7 +123,7 @@ def test_a_move_is_inserted_and_one_that_is_refused_is_told(tab: Tab, file: Path
 def test_what_is_inserted_next_goes_behind_both_calls_of_a_pair(tab: Tab, file: Path) -> None:
     for title in ("Lift and put down", "Pause"):
         tab.page.get_by_label("Insert a move").select_option(title)
-        _settle(tab)
+        tab.wait_for(SETTLED)
     assert '.down("FR", over=0.5).hold(0.5)' in file.read_text(encoding="utf-8")
 
 
@@ -150,7 +135,7 @@ def test_a_draft_is_given_up(tab: Tab, file: Path) -> None:
     tab.wait_for(f"{SAID} === 'not saved yet'")
     tab.page.keyboard.press("Escape")
     tab.wait_for(f"studio.selected === null && {SAID} === 'as it is saved'")
-    _settle(tab)
+    tab.wait_for(SETTLED)
     assert file.read_text(encoding="utf-8") == GREET
 
 

@@ -11,14 +11,13 @@ import numpy as np
 import pytest
 
 from motions.music import click_track
-from tests.live_preview import LivePreview
 from tests.viz.replay.browsing import Tab
+from tests.viz.replay.studio_tab import SETTLED, studio_tab, undo_all
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
 pytestmark = pytest.mark.slow
-SETTLED = "!studio.isBusy && !studio.waiting"
 ON_BEAT = 0.01  #: s; a beat of a click track is found as near as that
 DANCE = '''"""Dances."""
 
@@ -52,23 +51,16 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def studio(file: Path, chromium_browser: Browser) -> Iterator[Tab]:
-    with LivePreview(str(file), command="studio") as opened, Tab(chromium_browser) as tab:
-        tab.open(opened.url)
-        tab.wait_for("window.studio && replay.version")
+    with studio_tab(file, chromium_browser) as tab:
         tab.page.get_by_role("button", name="Skip the tour").click()
         yield tab
-        assert tab.complaints == []
-        assert all(url.startswith(opened.url.partition("?")[0]) for url in tab.requested)
 
 
 @pytest.fixture
 def tab(studio: Tab, file: Path) -> Iterator[Tab]:
     """The page, its file as it was at first; undone, it is so again."""
     yield studio
-    while studio.evaluate("studio.editor.undo"):
-        studio.evaluate("studio.act('undo')")
-        studio.wait_for(SETTLED)
-    assert file.read_text(encoding="utf-8") == DANCE
+    undo_all(studio, file, DANCE)
 
 
 def _choose(tab: Tab, name: str) -> None:
