@@ -92,10 +92,11 @@ def edge_cost(m: HeightMap, x: float, y: float, z: float) -> tuple[float, float]
 
 
 @subroutine
-def leg_miss(m: HeightMap, hip: V3, way: V3, foot: V3, c: Walk) -> float:
+def leg_miss(
+    m: HeightMap, hip: V3, way: V3, foot: V3, ahead: tuple[float, float], c: Walk
+) -> float:
     """How much room [m] a leg lacks in a stance, in which its hip goes the ``way`` [m]."""
-    length, missing = max(np.hypot(way[0], way[1]), TIE), 0.0
-    ahead = (way[0] / length, way[1] / length)
+    missing = 0.0
     for n in range(3):
         x, y, z = hip[0] + 0.5 * n * way[0], hip[1] + 0.5 * n * way[1], hip[2] + 0.5 * n * way[2]
         d = np.sqrt((x - foot[0]) ** 2 + (y - foot[1]) ** 2 + (z - foot[2]) ** 2)
@@ -112,7 +113,7 @@ def calf_miss(
 
     It is measured so far [m] ``behind`` its axis, in the direction opposite to ``ahead``.
     With d from hip to foot and links of the length l, the knee is sqrt(l^2 - d^2 / 4) behind the
-    middle between them, in the upright plane of the direction ``ahead``.
+    middle between them, in the upright plane of the heading ``ahead``, whichever way it walks.
     """
     dx, dy, dz = hip[0] - foot[0], hip[1] - foot[1], hip[2] - foot[2]
     d = np.sqrt(dx * dx + dy * dy + dz * dz)
@@ -169,8 +170,6 @@ def choose(
     way = (stance * v_x, stance * v_y, stance * climb)
     at = plus_scaled(triple(hip), spans[1] / stance, way)
     before = plus_scaled(at, -EARLIER / stance, way)
-    length = max(np.hypot(v_x, v_y), TIE)
-    ahead = (v_x / length, v_y / length)
     best, kept = np.inf, triple(step.chosen)
     for n in range(-1, (BACK + ALONG + 1) * (2 * ACROSS + 1)):
         i, j = n // (2 * ACROSS + 1) - BACK, n % (2 * ACROSS + 1) - ACROSS
@@ -192,9 +191,9 @@ def choose(
         if cost >= best:
             continue
         goal = (x, y, z + c.foot_radius)
-        cost += MISS * leg_miss(m, at, way, goal, c)
+        cost += MISS * leg_miss(m, at, way, goal, (cosine, sine), c)
         if cost < best:
-            cost += LOWERING * lowering_miss(m, before, goal, start[2] - goal[2], ahead, c)
+            cost += LOWERING * lowering_miss(m, before, goal, start[2] - goal[2], (cosine, sine), c)
         if cost < best:
             best = cost
             step.chosen[0], step.chosen[1] = x, y

@@ -193,6 +193,23 @@ def test_a_foot_waits_on_a_high_step_until_its_hip_has_gone_on(
     assert (state.feet[leg].step.chosen[0] < edge) == waits
 
 
+@pytest.mark.parametrize("speed", [-0.2, 0.0, 0.2])
+def test_the_calf_has_room_behind_the_foot_whichever_way_the_robot_walks(speed: float) -> None:
+    """All knees bend back, to the step behind the foot, also of one that steps in place."""
+    edge, hip = 0.20, MODEL.p_base_hips[0]
+    heights = exact_map(Stairs(0.12, 1, 0.31, start=edge, way=DOWN))
+    walking, q = planner(heights), standing_q(0.28 - 0.12)
+    state, step = walking._state, walking._state.feet[0].step
+    state.trunk.velocity[0] = speed
+    blind = np.array([edge + 0.09, 1.7 * hip[1], FOOT - 0.12])
+    q[0] = blind[0] - hip[0] - 0.25 * speed  # touchdown is in 0.25 s
+    state.feet[0].swing.start[:] = blind
+    choose(
+        0, MODEL.snapshot(state_of(q)), state, walking._walk, heights, (0.0, 0.25), blind, math.inf
+    )
+    assert step.chosen[0] > blind[0] + 0.02
+
+
 def test_a_trunk_that_sways_drags_no_foot_over_an_edge() -> None:
     """The blind foothold of each swing moves aside by 8 cm: over the gap between two stones."""
     terrain = Stones(start=0.05, count=6)
