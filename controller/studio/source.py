@@ -126,6 +126,30 @@ class Source:
         layout = re.match(r"\s*", self._text(self._link(call)))
         return self._behind(call, (layout[0] if layout else "") + code)
 
+    def parted(self, site: Site, first: str, second: str) -> Source:
+        """With two calls in the place of one; the second is laid out as that."""
+        start, end = self._link(self._call(site))
+        start = self._dot(start)
+        source = self.replaced((start, end), first, start + len(first.encode()))
+        return source.insert(source.site or site, second)
+
+    def arguments(self, site: Site) -> list[tuple[str, str, bool]]:
+        """Those of a call as they are written: name, text, and whether the name stands there.
+
+        Raises:
+            StudioError: for a call of ``*`` or ``**``.
+        """
+        call = self._call(site)
+        if any(isinstance(node, ast.Starred) for node in call.args):
+            raise StudioError(f"{self._name(call)}() is called with what a * stands for")
+        takes = parameters(self._name(call))
+        found = [(n, self._node(one), False) for n, one in zip(takes, call.args, strict=False)]
+        for word in call.keywords:
+            if word.arg is None:
+                raise StudioError(f"{self._name(call)}() is called with what ** stands for")
+            found.append((word.arg, self._node(word.value), True))
+        return found
+
     def offset(self, site: Site) -> int:
         """The first byte behind a call."""
         return self._span(self._call(site))[1]

@@ -158,6 +158,16 @@ class Studio {
     return this.send(orders.length > 1 ? { op: "many", orders } : orders[0], true);
   }
 
+  // The chosen call, or the one that runs there, is made two where the playhead is.
+  split() {
+    const { time } = this.player;
+    const isUnder = ({ span: [start, , end] }) => start < time && time < end;
+    const bar = this.own().find(isUnder) ?? this.editor.bars.find((one) => isOwn(one) && isUnder(one)) ?? this.bar();
+    if (!bar) return this.tell("put the playhead into a move, to make two of it", true);
+    this.made = { count: 2, isLast: true };
+    return this.send({ op: "split", site: bar.site, number: bar.number, time }, true);
+  }
+
   // The calls of the file that are not chosen, by their starts, and before which of them the chosen are.
   order() {
     const sites = new Set(this.own().map((bar) => String(bar.site)));
@@ -391,7 +401,8 @@ class Studio {
       b: () => this.play(), "+": () => this.view.zoom(ZOOM_STEP), "=": () => this.view.zoom(ZOOM_STEP),
       "-": () => this.view.zoom(1 / ZOOM_STEP), 0: () => this.view.fit(), z: () => this.zoomToChosen(),
       t: () => this.music.tap(), i: () => this.tools.focus("Insert a move"), "?": () => this.tools.help(),
-      e: () => this.inspector.focus(), l: () => this.focusBars(),
+      e: () => this.inspector.focus(), l: () => this.focusBars(), k: () => this.split(),
+      ",": () => this.nudge(-1), ".": () => this.nudge(1),
     };
     const commanded = {
       z: () => this.act(event.shiftKey ? "redo" : "undo"), y: () => this.act("redo"), a: () => this.all(),
@@ -402,6 +413,11 @@ class Studio {
     act();
     event.preventDefault();
     event.stopPropagation();
+  }
+
+  // The playhead a step of the clock on, or back.
+  nudge(side) {
+    this.player.scrub(rounded(this.player.time + side * NUDGE, NUDGE));
   }
 
   focusBars() {

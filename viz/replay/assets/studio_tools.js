@@ -4,7 +4,8 @@
 const KEYS = [
   ["Space", "play or pause"], ["L", "to the bars"], ["← →", "the bar before, after; elsewhere a frame back, on"],
   ["↑ ↓", "the lane above, below"], ["Shift + ← →", "choose several"], ["Ctrl + A", "choose all"],
-  ["[ ]", "shorter, longer"], ["Alt + ← →", "earlier, later"], ["D", "duplicate"], ["Delete", "delete"],
+  ["[ ]", "shorter, longer"], ["Alt + ← →", "earlier, later"], ["D", "duplicate"], ["K", "split at the playhead"], [", .", "the playhead 0.05 s back, on"],
+  ["Delete", "delete"],
   ["Ctrl + C, X, V", "copy, cut, paste; also into another motion"], ["Ctrl + Z, Y", "undo, redo"],
   ["I", "insert a move"], ["E", "to the numbers of the bar"], ["Esc", "as it is saved, nothing chosen"],
   ["+ −", "zoom the time; also wheel or two fingers"], ["0", "all of the time"], ["Z", "zoom to what is chosen"],
@@ -35,6 +36,7 @@ class Tools {
       this.group("Moves",
         this.list("Insert a move", "Insert…", "Puts a move behind the chosen one, or at the end (I)", palette, (title) => studio.insert(title)),
         this.button("op", "duplicate", "Duplicate", "Once more, behind it (D)"),
+        this.button("do", "split", "Split", "Makes two of a move, at the playhead (K)"),
         this.button("op", "delete", "Delete", "Delete"),
         this.button("op", "earlier", "Earlier", "Before the move that comes before it (Alt+left arrow)"),
         this.button("op", "later", "Later", "Behind the move that comes after it (Alt+right arrow)"),
@@ -63,7 +65,7 @@ class Tools {
     button.dataset[kind] = name;
     const { studio } = this;
     const acts = {
-      copy: () => studio.copy(), paste: () => studio.paste(), fit: () => studio.view.fit(),
+      split: () => studio.split(), copy: () => studio.copy(), paste: () => studio.paste(), fit: () => studio.view.fit(),
       zoomIn: () => studio.view.zoom(ZOOM_STEP), zoomOut: () => studio.view.zoom(1 / ZOOM_STEP), help: () => this.help(),
     };
     button.addEventListener("click", () => {

@@ -1,0 +1,85 @@
+"""What the studio's page makes of moves: split, laid out, joined to a show, as a user does it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.viz.replay.browsing import Tab
+from tests.viz.replay.studio_tab import SETTLED, do, studio_tab, undo_all
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+pytestmark = pytest.mark.slow
+SAID = "document.getElementById('studio-say').textContent"
+ACTS = '''"""Acts."""
+
+from motions import Timeline, deg, motion
+
+
+@motion
+def bow() -> Timeline:
+    """Bow, wait, and come back."""
+    return Timeline().body(pitch=deg(10.0), over=1.0).hold(0.5).home(over=0.6)
+
+
+@motion
+def look() -> Timeline:
+    """Look aside."""
+    return Timeline().body(yaw=deg(12.0), over=0.6).home(over=0.6)
+'''
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("studio") / "acts.py"
+    path.write_text(ACTS, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def studio(file: Path, chromium_browser: Browser) -> Iterator[Tab]:
+    with studio_tab(file, chromium_browser) as tab:
+        tab.page.get_by_role("button", name="Skip the tour").click()
+        yield tab
+
+
+@pytest.fixture
+def tab(studio: Tab, file: Path) -> Iterator[Tab]:
+    """The page, its file as it was at first; undone, it is so again."""
+    yield studio
+    undo_all(studio, file, ACTS)
+
+
+def test_a_move_is_split_at_the_playhead_by_key_and_button(tab: Tab, file: Path) -> None:
+    tab.evaluate("replay.scrub(0.55)")
+    for _ in range(3):
+        tab.page.keyboard.press(",")
+    assert tab.evaluate("replay.time") == pytest.approx(0.4)
+    whole = tab.evaluate("replay.data.duration")
+    do(tab, "document.activeElement.blur()")
+    tab.page.keyboard.press("k")
+    tab.wait_for(f"{SAID} === 'saved'")
+    tab.wait_for(SETTLED)
+    text = file.read_text(encoding="utf-8")
+    assert ".body(pitch=deg(3.17), over=0.4).body(pitch=deg(10.0), over=0.6).hold" in text
+    assert tab.evaluate("replay.data.duration") == pytest.approx(whole)
+    assert tab.evaluate("[...studio.chosen]") == [0, 1], "both are chosen"
+    tab.evaluate("replay.scrub(1.2)")
+    tab.page.get_by_role("button", name="Split").click()
+    tab.wait_for("studio.editor.bars.length === 5")
+    tab.wait_for(SETTLED)
+    assert ".hold(0.2).hold(0.3).home" in file.read_text(encoding="utf-8")
+
+
+def test_where_nothing_can_be_split_it_says_why(tab: Tab, file: Path) -> None:
+    tab.page.locator("[data-bar='1']").click()  # the playhead goes to its end
+    do(tab, "studio.split()")
+    assert tab.text("#studio-say") == (
+        "the playhead is at 1.50 s: to split hold(), put it between 1.00 and 1.50 s"
+    )
+    assert file.read_text(encoding="utf-8") == ACTS
