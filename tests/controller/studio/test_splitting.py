@@ -51,8 +51,8 @@ def _split(body: str, number: int, time: float) -> tuple[bytes, Source]:
         ("Timeline().body(yaw=deg(10.0), over=1.0)", 0, 0.5,
          "Timeline().body(yaw=deg(5.0), over=0.5).body(yaw=deg(10.0), over=0.5)"),
         ('Timeline().body(z=-0.02, over=0.5).body(z=0.02, over=0.4, ease="linear")', 1, 0.6,
-         'Timeline().body(z=-0.02, over=0.5).body(z=-0.01, over=0.1, ease="linear")'
-         '.body(z=0.02, over=0.3, ease="linear")'),
+         '(\n        Timeline().body(z=-0.02, over=0.5).body(z=-0.01, over=0.1, ease="linear")'
+         '\n        .body(z=0.02, over=0.3, ease="linear")\n    )'),
         ("Timeline().body(z=-0.04, over=0.5).home(over=1.0)", 1, 1.0,
          "Timeline().body(z=-0.04, over=0.5).body(z=-0.02, over=0.5).home(over=0.5)"),
         ("Timeline().walk(0.2, over=8.0)", 0, 4.0,

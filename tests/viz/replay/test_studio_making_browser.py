@@ -66,7 +66,7 @@ def test_a_move_is_split_at_the_playhead_by_key_and_button(tab: Tab, file: Path)
     tab.wait_for(f"{SAID} === 'saved'")
     tab.wait_for(SETTLED)
     text = file.read_text(encoding="utf-8")
-    assert ".body(pitch=deg(3.17), over=0.4).body(pitch=deg(10.0), over=0.6).hold" in text
+    assert ".body(pitch=deg(3.17), over=0.4)\n        .body(pitch=deg(10.0), over=0.6).hold" in text
     assert tab.evaluate("replay.data.duration") == pytest.approx(whole)
     assert tab.evaluate("[...studio.chosen]") == [0, 1], "both are chosen"
     tab.evaluate("replay.scrub(1.2)")
@@ -83,3 +83,28 @@ def test_where_nothing_can_be_split_it_says_why(tab: Tab, file: Path) -> None:
         "the playhead is at 1.50 s: to split hold(), put it between 1.00 and 1.50 s"
     )
     assert file.read_text(encoding="utf-8") == ACTS
+
+
+def test_the_last_bar_has_room_to_be_longer(tab: Tab, file: Path) -> None:
+    box = tab.page.locator("[data-bar='2']").bounding_box() or {}
+    lane = tab.page.locator(".lane > div").first.bounding_box() or {}
+    second = box["width"] / 0.6
+    right, middle = box["x"] + box["width"], box["y"] + box["height"] / 2
+    assert lane["x"] + lane["width"] - right > 0.3 * second
+    mouse = tab.page.mouse
+    mouse.move(right - 3, middle)
+    mouse.down()
+    mouse.move(right - 3 + 0.3 * second, middle, steps=3)
+    mouse.up()
+    tab.wait_for(f"{SAID} === 'saved'")
+    tab.wait_for(SETTLED)
+    assert ".home(over=0.9)" in file.read_text(encoding="utf-8")
+
+
+def test_a_turn_that_is_too_short_is_told_as_a_turn(tab: Tab) -> None:
+    tab.page.locator("[data-bar='2']").click()
+    tab.page.get_by_label("Insert a move").select_option("Turn round")
+    tab.wait_for("studio.editor.bars.length === 4")
+    tab.wait_for(SETTLED)
+    do(tab, "studio.set(studio.bar(), 'over', 1.0, true)")
+    assert "turn(): 1.00 s are too short" in tab.text("#studio-say")
