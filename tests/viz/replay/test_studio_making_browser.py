@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 from tests.viz.replay.browsing import Tab
@@ -108,3 +109,23 @@ def test_a_turn_that_is_too_short_is_told_as_a_turn(tab: Tab) -> None:
     tab.wait_for(SETTLED)
     do(tab, "studio.set(studio.bar(), 'over', 1.0, true)")
     assert "turn(): 1.00 s are too short" in tab.text("#studio-say")
+
+
+def test_onion_skins_show_the_robot_before_and_after(tab: Tab) -> None:
+    shown = "studio.onion.skins.filter((skin) => skin.body.root.visible).map((skin) => skin.after)"
+    assert tab.evaluate("studio.onion.skins.length") == 0, "who does not ask for them pays nothing"
+    tab.evaluate("replay.scrub(0.5); document.activeElement.blur()")
+    before = tab.stage()
+    tab.page.keyboard.press("h")
+    assert sorted(tab.evaluate(shown)) == [-0.3, 0.3, 0.6], "0.1 s before the start there is none"
+    skins = tab.stage()
+    seen = (np.abs(skins - before).max(axis=2) > 12).mean()
+    assert 0.002 < seen < 0.1
+    red, _, blue = np.moveaxis(skins - before, 2, 0)
+    assert (blue - red > 12).any()
+    assert (red - blue > 12).any()
+    tab.evaluate("replay.scrub(1.25)")
+    assert set(tab.evaluate(shown)) == {-0.6, 0.6}, "where it stays, they would hide behind it"
+    tab.evaluate("replay.scrub(0.5)")
+    tab.page.get_by_role("button", name="Onion skins").click()
+    assert np.abs(tab.stage() - before).max() < 2

@@ -33,6 +33,25 @@ class Body {
     const joints = this.joints.map(({ node, axis }) => ({ node: twins.get(node), axis }));
     return new Body(root, twins.get(this.base), joints);
   }
+
+  // Seen through, in one colour. First the depth alone, so that only its outside is seen; solid
+  // parts win a tie.
+  veil(color, opacity, order) {
+    const { THREE } = MeshCat;
+    const shared = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 };
+    const depth = new THREE.MeshBasicMaterial({ ...shared, colorWrite: false });
+    const skin = new THREE.MeshLambertMaterial({ ...shared, color, transparent: true, opacity, depthWrite: false });
+    const meshes = [];
+    this.root.traverse((item) => item.isMesh && meshes.push(item));
+    for (const mesh of meshes) {
+      mesh.material = depth;
+      mesh.renderOrder = order;
+      const over = new THREE.Mesh(mesh.geometry, skin);
+      mesh.castShadow = mesh.receiveShadow = over.castShadow = over.receiveShadow = false;
+      over.renderOrder = order + 0.1;
+      mesh.add(over);
+    }
+  }
 }
 
 class Ghost {
@@ -57,23 +76,7 @@ class Ghost {
 
   make() {
     this.body = this.scene.body.twin();
-    // First the depth alone, so that only the ghost's outside is seen; solid parts win a tie.
-    const { THREE } = MeshCat;
-    const shared = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 };
-    const depth = new THREE.MeshBasicMaterial({ ...shared, colorWrite: false });
-    const skin = new THREE.MeshLambertMaterial({
-      ...shared, color: GHOST_COLORS[this.name], transparent: true, opacity: GHOST_OPACITY, depthWrite: false,
-    });
-    const meshes = [];
-    this.body.root.traverse((item) => item.isMesh && meshes.push(item));
-    for (const mesh of meshes) {
-      mesh.material = depth;
-      mesh.renderOrder = 0.5;
-      const over = new THREE.Mesh(mesh.geometry, skin);
-      mesh.castShadow = mesh.receiveShadow = over.castShadow = over.receiveShadow = false;
-      over.renderOrder = 0.6;
-      mesh.add(over);
-    }
+    this.body.veil(GHOST_COLORS[this.name], GHOST_OPACITY, 0.5);
     this.scene.viewer.set_object(["meshcat", this.name], this.body.root);
   }
 

@@ -22,6 +22,7 @@ class Studio {
     this.tools = new Tools(this);
     this.inspector = new Inspector(this);
     this.hands = new Hands(this);
+    this.onion = new Onion(this);
     document.getElementById("timeline").before(this.tools.box, this.music.box, this.tracks.box, this.view.box);
     document.getElementById("sliders").before(this.inspector.box);
     this.charts = player.charts.filter(({ canvas }) => canvas.closest("footer"));
@@ -59,6 +60,7 @@ class Studio {
     this.tracks.show(t);
     this.music.show(t);
     this.hands.show(t);
+    this.onion.show(t);
   }
 
   onScrub() {}
@@ -402,6 +404,7 @@ class Studio {
       "-": () => this.view.zoom(1 / ZOOM_STEP), 0: () => this.view.fit(), z: () => this.zoomToChosen(),
       t: () => this.music.tap(), i: () => this.tools.focus("Insert a move"), "?": () => this.tools.help(),
       e: () => this.inspector.focus(), l: () => this.focusBars(), k: () => this.split(),
+      h: () => this.onion.toggle(),
       ",": () => this.nudge(-1), ".": () => this.nudge(1),
     };
     const commanded = {

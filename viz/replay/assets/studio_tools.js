@@ -9,6 +9,7 @@ const KEYS = [
   ["Ctrl + C, X, V", "copy, cut, paste; also into another motion"], ["Ctrl + Z, Y", "undo, redo"],
   ["I", "insert a move"], ["E", "to the numbers of the bar"], ["Esc", "as it is saved, nothing chosen"],
   ["+ −", "zoom the time; also wheel or two fingers"], ["0", "all of the time"], ["Z", "zoom to what is chosen"],
+  ["H", "onion skins: the robot before and after"],
   ["B", "play in physics"], ["T", "tap the tempo"], ["1 2 3 4", "view from the corner, side, front, above"],
   ["N", "to the next limit that is broken or tight"],
 ];
@@ -43,7 +44,8 @@ class Tools {
         this.button("do", "copy", "Copy", "Ctrl+C"), this.button("do", "paste", "Paste", "Behind the chosen move, also in another motion of the file (Ctrl+V)")),
       this.group("Time",
         this.icon("zoomOut", "−", "Show more of the time (-)"), this.icon("zoomIn", "+", "Show less of the time, larger (+); also wheel or two fingers"),
-        this.button("do", "fit", "Fit", "Show all of the time (0)")),
+        this.button("do", "fit", "Fit", "Show all of the time (0)"),
+        this.button("do", "onion", "Onion skins", "The robot 0.3 and 0.6 s before the playhead, blue, and after it, orange (H)")),
       studio.music.buttons);
     this.robot = this.group("Robot",
       this.button("ask", "play", "Play in physics", "MuJoCo plays it beside the plan (B)"),
@@ -65,7 +67,7 @@ class Tools {
     button.dataset[kind] = name;
     const { studio } = this;
     const acts = {
-      split: () => studio.split(), copy: () => studio.copy(), paste: () => studio.paste(), fit: () => studio.view.fit(),
+      split: () => studio.split(), onion: () => studio.onion.toggle(), copy: () => studio.copy(), paste: () => studio.paste(), fit: () => studio.view.fit(),
       zoomIn: () => studio.view.zoom(ZOOM_STEP), zoomOut: () => studio.view.zoom(1 / ZOOM_STEP), help: () => this.help(),
     };
     button.addEventListener("click", () => {
