@@ -16,6 +16,7 @@ from controller.studio.orders import Answer, Bar, Cut, Order, Task
 from controller.studio.project import Project
 from controller.studio.rewriting import offers
 from controller.studio.running import Runner
+from controller.studio.shows import with_show
 from controller.studio.songs import heard, songs_beside, sound_of
 from controller.studio.source import Source, parameters
 from controller.studio.together import copied, edited_together, pasted
@@ -103,9 +104,9 @@ class Studio:
         Args:
             order: see ``edited_together``; besides ``op`` "undo" and "redo", "change" (see
                 ``mend``), "offers" (what there is to be done for a bar, by ``site`` and ``number``)
-                and "split" (it, at a ``time``), and "paste" behind ``site`` what ``copy`` has
-                taken. ``base`` is the state of the file that the page knows, ``commit`` whether to
-                save.
+                and "split" (it, at a ``time``), "show" (a motion that plays all others), and
+                "paste" behind ``site`` what ``copy`` has taken. ``base`` is the state of the file
+                that the page knows, ``commit`` whether to save.
 
         Returns:
             What the page shows next, packed, and of what was saved the ``site`` of the call that
@@ -130,13 +131,16 @@ class Studio:
             (self._project.undo if op == "undo" else self._project.redo)()
             self.show()
             return {}
-        source = self._edited(order)
+        if order.get("op") == "show":
+            source, chosen = with_show(Source(self._project.saved), self._motions)
+        else:
+            source, chosen = self._edited(order), self.motion
         data, site = source.data, dict[str, object](site=source.site)
-        shown = self._run(data)  # what is no motion is not saved
+        shown = self._run(data, chosen=chosen)  # what is no motion is not saved
         if order.get("commit") is True:
             self._project.save(data)
-            self._bars = shown.bars
-            self._server.publish(self._content(shown))
+            self._bars, self.motion = shown.bars, shown.title
+            self._server.publish(self._content(shown), shown.title)
             return site
         return {"data": content_text(self._content(shown), shown.title, is_brief=True)}
 
@@ -260,7 +264,9 @@ class Studio:
     def show(self) -> None:
         """Run what the file says and show it, or why it is no motion."""
         try:
-            self._server.publish(self._content(self._run(self._project.saved)))
+            shown = self._run(self._project.saved)
+            self.motion = shown.title  # another one, if that has gone
+            self._server.publish(self._content(shown), shown.title)
         except StudioError as error:
             self._server.publish_error(str(error))
 
@@ -284,8 +290,15 @@ class Studio:
             self._values = values
             self.show()
 
-    def _run(self, data: bytes, task: Task = Task.CHECK, cut: Cut | None = None) -> Answer:
-        order = Order(self._project.path, data, self.motion, self._values, task, cut)
+    def _run(
+        self,
+        data: bytes,
+        task: Task = Task.CHECK,
+        cut: Cut | None = None,
+        chosen: str | None = None,
+    ) -> Answer:
+        motion = chosen or self.motion
+        order = Order(self._project.path, data, motion, self._values, task, cut)
         is_quick = task in (Task.CHECK, Task.SPLIT)
         answer = (self._runner if is_quick else self._player).run(order)
         if data == self._project.saved and answer.bars:

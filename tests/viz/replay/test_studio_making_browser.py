@@ -129,3 +129,19 @@ def test_onion_skins_show_the_robot_before_and_after(tab: Tab) -> None:
     tab.evaluate("replay.scrub(0.5)")
     tab.page.get_by_role("button", name="Onion skins").click()
     assert np.abs(tab.stage() - before).max() < 2
+
+
+def test_the_motions_of_a_file_are_made_a_show(tab: Tab, file: Path) -> None:
+    tab.page.get_by_role("button", name="Make a show").click()
+    tab.wait_for("studio.editor.motion === 'show'")
+    tab.wait_for(SETTLED)
+    assert "    return bow().then(look())\n" in file.read_text(encoding="utf-8")
+    assert tab.page.get_by_role("tab", selected=True).inner_text() == "Show"
+    assert tab.evaluate("replay.data.duration") == pytest.approx(3.3)
+    assert tab.text("#badge").startswith("feasible")
+    do(tab, "studio.export('html')")
+    tab.wait_for(f"{SAID} === 'wrote show.html'")
+    assert file.with_name("show.html").exists()
+    do(tab, "studio.act('undo')")
+    tab.wait_for("studio.editor.motion === 'bow'")
+    assert tab.page.get_by_role("tab").count() == 2

@@ -27,7 +27,8 @@ class Tools {
     this.changes = element("div", { id: "studio-changes", className: "buttons" });
     this.fill(studio);
     this.notes = element("p", { id: "studio-notes" });
-    this.box.append(this.tabs, this.say, this.robot, this.row, this.changes, this.notes);
+    this.show = this.button("do", "show", "Make a show", "Writes a motion that plays the others one after the other, in the order of the file");
+    this.box.append(this.tabs, this.show, this.say, this.robot, this.row, this.changes, this.notes);
   }
 
   fill(studio) {
@@ -67,7 +68,7 @@ class Tools {
     button.dataset[kind] = name;
     const { studio } = this;
     const acts = {
-      split: () => studio.split(), onion: () => studio.onion.toggle(), copy: () => studio.copy(), paste: () => studio.paste(), fit: () => studio.view.fit(),
+      show: () => studio.send({ op: "show" }, true), split: () => studio.split(), onion: () => studio.onion.toggle(), copy: () => studio.copy(), paste: () => studio.paste(), fit: () => studio.view.fit(),
       zoomIn: () => studio.view.zoom(ZOOM_STEP), zoomOut: () => studio.view.zoom(1 / ZOOM_STEP), help: () => this.help(),
     };
     button.addEventListener("click", () => {
@@ -118,6 +119,7 @@ class Tools {
       tab.addEventListener("click", () => motion !== this.studio.editor.motion && this.studio.open(motion));
       return tab;
     });
+    this.show.hidden = tabs.length < 2;
     const name = element("b", { textContent: editor.file });
     name.setAttribute("role", "presentation");
     if (this.shape === `${editor.motion} ${editor.motions}`) return;
