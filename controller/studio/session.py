@@ -12,6 +12,7 @@ from typing import final
 
 import viz
 from controller.studio.edits import PALETTE, edited, run_of, site_of
+from controller.studio.library import library
 from controller.studio.orders import Answer, Bar, Cut, Order, Task
 from controller.studio.project import Project
 from controller.studio.rewriting import offers
@@ -87,6 +88,7 @@ class Studio:
                     "/edit": self.edit,
                     "/copy": self.copy,
                     "/choose": self.choose,
+                    "/library": lambda _: library(),
                     "/music": self.music,
                     "/play": self.play,
                     "/mend": self.mend,

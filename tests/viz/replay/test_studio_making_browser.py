@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from PIL import Image
 
+from motions import find_motion, motion_names
 from tests.viz.replay.browsing import Tab
 from tests.viz.replay.studio_tab import SETTLED, do, studio_tab, undo_all
 
@@ -145,3 +148,27 @@ def test_the_motions_of_a_file_are_made_a_show(tab: Tab, file: Path) -> None:
     do(tab, "studio.act('undo')")
     tab.wait_for("studio.editor.motion === 'bow'")
     assert tab.page.get_by_role("tab").count() == 2
+
+
+def test_a_motion_of_the_library_is_chosen_by_its_picture(tab: Tab, file: Path) -> None:
+    do(tab, "studio.choose([]); document.activeElement.blur()")
+    tab.page.keyboard.press("a")
+    search = tab.page.get_by_label("Search the library")
+    cards = tab.page.locator("#library [data-motion]:visible")
+    cards.first.wait_for()
+    assert cards.count() == len(motion_names())
+    picture = tab.page.locator("[data-motion=nod] i").screenshot()
+    assert np.asarray(Image.open(io.BytesIO(picture)).convert("L"), dtype=float).std() > 15.0
+    search.fill("nod")
+    assert cards.count() < 5
+    search.press("Enter")
+    tab.wait_for(f"{SAID} === 'saved'")
+    tab.wait_for(SETTLED)
+    text = file.read_text(encoding="utf-8")
+    assert "from motions import Timeline, deg, motion, find_motion\n" in text
+    assert '\n        .then(find_motion("nod")())\n    )\n' in text
+    assert tab.evaluate("studio.bar().name") == "then", "what was made is chosen"
+    assert tab.evaluate("replay.data.duration") == pytest.approx(2.1 + find_motion("nod")().end)
+    do(tab, "studio.select(0); studio.playBehind('nod')")
+    assert "home" in tab.text("#studio-say"), "the robot is not at home there"
+    assert file.read_text(encoding="utf-8") == text

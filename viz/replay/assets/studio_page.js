@@ -23,6 +23,7 @@ class Studio {
     this.inspector = new Inspector(this);
     this.hands = new Hands(this);
     this.onion = new Onion(this);
+    this.library = new Library(this);
     document.getElementById("timeline").before(this.tools.box, this.music.box, this.tracks.box, this.view.box);
     document.getElementById("sliders").before(this.inspector.box);
     this.charts = player.charts.filter(({ canvas }) => canvas.closest("footer"));
@@ -211,6 +212,12 @@ class Studio {
     const isPair = title === LIFT_AND_DOWN; // the first of it is what is pulled
     this.made = { count: isPair ? 2 : 1, isLast: true, isFirst: isPair };
     this.send(site ? { op: "insert", site, title, values } : { op: "begin", title }, true);
+  }
+
+  // A motion of the library; the robot must be at home there.
+  playBehind(name) {
+    this.made = { count: 1, isLast: true };
+    this.send({ op: "library", site: this.placeOfNew() ?? null, name }, true);
   }
 
   // The call behind which something new is put: the last that is chosen, else the last of all.
@@ -404,7 +411,7 @@ class Studio {
       "-": () => this.view.zoom(1 / ZOOM_STEP), 0: () => this.view.fit(), z: () => this.zoomToChosen(),
       t: () => this.music.tap(), i: () => this.tools.focus("Insert a move"), "?": () => this.tools.help(),
       e: () => this.inspector.focus(), l: () => this.focusBars(), k: () => this.split(),
-      h: () => this.onion.toggle(),
+      h: () => this.onion.toggle(), a: () => this.library.open(),
       ",": () => this.nudge(-1), ".": () => this.nudge(1),
     };
     const commanded = {

@@ -7,7 +7,7 @@ const KEYS = [
   ["[ ]", "shorter, longer"], ["Alt + ← →", "earlier, later"], ["D", "duplicate"], ["K", "split at the playhead"], [", .", "the playhead 0.05 s back, on"],
   ["Delete", "delete"],
   ["Ctrl + C, X, V", "copy, cut, paste; also into another motion"], ["Ctrl + Z, Y", "undo, redo"],
-  ["I", "insert a move"], ["E", "to the numbers of the bar"], ["Esc", "as it is saved, nothing chosen"],
+  ["I", "insert a move"], ["A", "play a motion of the library"], ["E", "to the numbers of the bar"], ["Esc", "as it is saved, nothing chosen"],
   ["+ −", "zoom the time; also wheel or two fingers"], ["0", "all of the time"], ["Z", "zoom to what is chosen"],
   ["H", "onion skins: the robot before and after"],
   ["B", "play in physics"], ["T", "tap the tempo"], ["1 2 3 4", "view from the corner, side, front, above"],
@@ -37,6 +37,7 @@ class Tools {
       this.group("History", this.button("op", "undo", "Undo", "Ctrl+Z"), this.button("op", "redo", "Redo", "Ctrl+Y")),
       this.group("Moves",
         this.list("Insert a move", "Insert…", "Puts a move behind the chosen one, or at the end (I)", palette, (title) => studio.insert(title)),
+        this.button("ask", "library", "Library…", "Plays a motion of the library behind the chosen move, or at the end (A)"),
         this.button("op", "duplicate", "Duplicate", "Once more, behind it (D)"),
         this.button("do", "split", "Split", "Makes two of a move, at the playhead (K)"),
         this.button("op", "delete", "Delete", "Delete"),
@@ -73,6 +74,7 @@ class Tools {
     };
     button.addEventListener("click", () => {
       if (kind === "op") studio.act(name);
+      else if (name === "library") studio.library.open();
       else if (kind === "ask") studio[name]();
       else acts[name]();
     });
