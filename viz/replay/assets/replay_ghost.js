@@ -8,6 +8,10 @@ const GHOST_COLORS = { ghost: 0x6d8ff5, written: 0xb8793b };
 
 // A tree of meshes with a base and joints that a configuration moves.
 class Body {
+  /** @type {any} */ root;
+  /** @type {any} */ base;
+  /** @type {{ node: any, axis: any }[]} */ joints;
+
   constructor(root, base, joints) {
     Object.assign(this, { root, base, joints });
   }
@@ -55,6 +59,12 @@ class Body {
 }
 
 class Ghost {
+  /** @type {RobotScene} */ scene;
+  /** @type {string} */ name;
+  /** @type {string} */ place;
+  /** @type {Run} */ run;
+  /** @type {Body} */ body;
+
   constructor(scene, name) {
     Object.assign(this, { scene, name, place: "beside", run: null });
   }

@@ -2,6 +2,9 @@
 // The motions of the library, with pictures: one is chosen and played behind the chosen move.
 
 class Library {
+  /** @type {Studio} */ studio;
+  /** @type {any} */ known;
+
   constructor(studio) {
     this.studio = studio;
     this.known = null; // asked for when it is opened first

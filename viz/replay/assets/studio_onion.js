@@ -7,6 +7,12 @@ const SKINS = [ // s from the playhead, colour, how much is seen of it; the fart
 const LEAST_WAY = 0.03; // m or rad: one that is as near to the robot hides it, and shows nothing
 
 class Onion {
+  /** @type {Studio} */ studio;
+  /** @type {boolean} */ isOn;
+  /** @type {{ after: number, body: Body }[]} */ skins;
+  /** @type {Float32Array} */ there;
+  /** @type {Float32Array} */ here;
+
   constructor(studio) {
     Object.assign(this, { studio, isOn: false, skins: [], there: new Float32Array(20), here: new Float32Array(20) });
   }
@@ -16,7 +22,7 @@ class Onion {
     if (!this.skins.length) this.make();
     const button = document.querySelector("[data-do=onion]");
     button.classList.toggle("on", this.isOn);
-    button.setAttribute("aria-pressed", this.isOn);
+    button.setAttribute("aria-pressed", String(this.isOn));
     this.show(this.studio.player.time);
     this.studio.player.scene.viewer.set_dirty();
   }

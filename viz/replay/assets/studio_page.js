@@ -9,6 +9,10 @@ const SLOWER = 1.2; // what the whole is slowed down by at first, where that is 
 const SNAP = 8; // px, a bar that ends this near a beat ends on it
 
 class Studio {
+  /** @type {Editor} */ editor;
+  /** @type {number} */ selected;
+  /** @type {Set<number>} */ chosen;
+
   constructor(player) {
     this.player = player;
     this.selected = null; // place in `bars` of the bar that is edited
@@ -40,6 +44,10 @@ class Studio {
   }
 
   // Shows what is saved, or what the player has got; calls that were just changed or made are chosen.
+  /**
+   * @param {Editor} editor
+   * @param {[number, number]} site
+   */
   use(editor, site = null) {
     if (!editor?.bars) return; // the player's data, as a chart of it: see `show`
     const isOther = this.editor && this.editor.motion !== editor.motion;
@@ -59,7 +67,6 @@ class Studio {
   show(t) {
     if (this.player.isPlaying) this.view.follow(t);
     this.tracks.show(t);
-    this.music.show(t);
     this.hands.show(t);
     this.onion.show(t);
   }
@@ -230,12 +237,14 @@ class Studio {
 
   // What else can be done with a call, such as writing out its loop: orders with their titles.
   async offers({ site, number }) {
-    const { offers = [] } = await this.post("edit", { op: "offers", site, number, base: this.editor.base });
+    const answer = await this.post("edit", { op: "offers", site, number, base: this.editor.base });
+    const offers = /** @type {(Order & { title: string })[]} */ (answer.offers ?? []);
     return offers.map(({ title, ...order }) => ({
       text: title, hint: "changes the file; Undo takes it back", act: () => this.rewrite({ value: SLOWER, ...order, site, number }),
     }));
   }
 
+  /** @param {Order} order */
   rewrite(order) {
     this.made = { count: 1 };
     this.inspector.forget();
@@ -244,10 +253,21 @@ class Studio {
 
   // A number or word for an argument of the chosen call; a draft is shown, but not saved. Jumps are
   // solved, which takes up to half a minute: only when they are let go.
+  /**
+   * @param {Bar} bar
+   * @param {string} name
+   * @param {number | string} value
+   * @param {boolean} isCommitted
+   */
   set(bar, name, value, isCommitted) {
     this.setMany(bar, { [name]: value }, isCommitted);
   }
 
+  /**
+   * @param {Bar} bar
+   * @param {Record<string, number | string>} values
+   * @param {boolean} isCommitted
+   */
   setMany(bar, values, isCommitted) {
     this.inspector.follow(values);
     if (!isCommitted && bar.parts.includes("robot")) return;
@@ -270,6 +290,11 @@ class Studio {
   }
 
   // The argument with which a call ends at `end` [s], or on a beat at most `room` [s] away.
+  /**
+   * @param {Bar} bar
+   * @param {number} end
+   * @param {number} room
+   */
   durationFor(bar, end, room) {
     const beat = this.beats.find((one) => Math.abs(one - end) < room);
     const nudge = this.timeUnit === "beats" ? BEAT_NUDGE : NUDGE;
@@ -278,6 +303,10 @@ class Studio {
     return Math.max(isOff ? Math.round(1000 * exact) / 1000 : rounded(exact, nudge), nudge);
   }
 
+  /**
+   * @param {Order} order
+   * @param {boolean} isCommitted
+   */
   async send(order, isCommitted) {
     if (this.isBusy) {
       if (!this.waiting || !this.waiting.isCommitted || isCommitted) this.waiting = { order, isCommitted };
@@ -329,6 +358,7 @@ class Studio {
   }
 
   // A draft moves bars; their places in the file are those of what is saved.
+  /** @param {Editor} draft */
   redrawDraft(draft) {
     if (draft.bars.length !== this.editor.bars.length) return;
     this.view.use();
@@ -439,23 +469,6 @@ class Studio {
     if (!spans.length) return;
     this.view.show([Math.min(...spans.map(([start]) => start)), Math.max(...spans.map((span) => span[2]))]);
   }
-}
-
-// Whether a call stands in the file that is open.
-function isOwn(bar) {
-  return Boolean(bar) && bar.site[0] > 0;
-}
-
-function isAt(bar, site) {
-  return bar.site[0] === site[0] && bar.site[1] === site[1];
-}
-
-// The argument that says how long a call lasts; of a walk without one, what it would say.
-function lengthOf(bar) {
-  const slot = bar.slots.find(({ name }) => ["over", "seconds"].includes(name));
-  if (slot) return slot.span ? slot : null;
-  const takes = bar.more.includes("over") && !bar.parts.includes("robot");
-  return takes ? { name: "over", value: bar.span[2] - bar.span[1] } : null;
 }
 
 function rounded(value, step) {

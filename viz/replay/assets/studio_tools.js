@@ -15,6 +15,8 @@ const KEYS = [
 ];
 
 class Tools {
+  /** @type {Studio} */ studio;
+
   constructor(studio) {
     this.studio = studio;
     this.box = element("div", { id: "studio-tools" });
@@ -103,6 +105,10 @@ class Tools {
     this.box.querySelector(`[aria-label="${label}"]`).focus();
   }
 
+  /**
+   * @param {Editor} editor
+   * @param {any} header
+   */
   use(editor, header) {
     const count = this.studio.own().length;
     const enable = (name, isPossible) => {
