@@ -4,6 +4,7 @@
 class Library {
   /** @type {Studio} */ studio;
   /** @type {any} */ known;
+  /** @type {string} */ sheet;
 
   constructor(studio) {
     this.studio = studio;
@@ -17,6 +18,7 @@ class Library {
       this.known = null;
       return;
     }
+    this.sheet ??= URL.createObjectURL(new Blob([bytesOf(this.known.sheet)], { type: "image/webp" }));
     studio.tell("");
     const dialog = element("dialog", { id: "library" });
     dialog.setAttribute("aria-label", "Motions of the library");
@@ -52,12 +54,12 @@ class Library {
   }
 
   card({ name, told, lasts }, number, dialog) {
-    const { columns, size: [width, height], sheet } = this.known;
+    const { columns, size: [width, height] } = this.known;
     const card = element("button", { title: `${readable(name)}, ${lasts.toFixed(1)} s. ${told}` });
     card.dataset.motion = name;
     const picture = element("i");
     Object.assign(picture.style, {
-      width: `${width}px`, height: `${height}px`, backgroundImage: `url(data:image/webp;base64,${sheet})`,
+      width: `${width}px`, height: `${height}px`, backgroundImage: `url(${this.sheet})`,
       backgroundPosition: `${-width * (number % columns)}px ${-height * Math.floor(number / columns)}px`,
     });
     card.append(picture, element("b", { textContent: readable(name) }), element("small", { textContent: `${lasts.toFixed(1)} s` }));
