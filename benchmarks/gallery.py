@@ -11,12 +11,13 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageSequence
 
 from controller.cli.common import ExitCode
 from controller.demo import DEMO_STEPS, run_demo
 from controller.demo.steps import TERRAINS, terrain_steps
 from controller.go2_controller import GO2Controller
+from controller.studio.library import COLUMNS, PICTURE_SIZE, SHEET
 from go2_wbc.errors import ConfigError, MotionError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.plant import MujocoPlant
@@ -41,6 +42,7 @@ STYLE = ShotStyle(
     samples=2,
 )
 """A camera that nearly stands still, so that what moves is the robot."""
+SHEET_QUALITY = 60  # Of WebP: 0 to 100
 SIZE_LIMIT = 400_000  # Largest loop [bytes]
 FILM_SPEED, FILM_RATE = 2.0, 10.0
 """Seconds of the run in a second of the film, and pictures in a second of it."""
@@ -98,6 +100,7 @@ def run(
         for line in timelines:
             recording = played(line, robot)
             _write(folder / "images" / "gallery" / f"{line.name}.avif", loop(recording))
+    write_atomically(SHEET, sheet(folder / "images" / "gallery"))
     write_atomically(target, page().encode())
     return ExitCode.OK
 
@@ -112,6 +115,28 @@ def page() -> str:
     found = [find_motion(name) for name in motion_names()]
     index = " · ".join(f"[{motion.name}](#{motion.name})" for motion in found)
     return "\n".join([HEAD, index, "", *(_section(motion) for motion in found)])
+
+
+def sheet(folder: Path) -> bytes:
+    """The motions as the studio offers them: of each loop the picture that is least like its start.
+
+    In the order of ``motion_names()``, in rows.
+    """
+    names, (width, height) = motion_names(), PICTURE_SIZE
+    whole = Image.new("RGB", (width * COLUMNS, height * -(-len(names) // COLUMNS)))
+    for number, name in enumerate(names):
+        with Image.open(folder / f"{name}.avif") as loop_of_it:
+            pictures = [
+                picture.convert("RGB").resize(PICTURE_SIZE, Image.Resampling.LANCZOS)
+                for picture in ImageSequence.Iterator(loop_of_it)
+            ]
+        values = np.array([np.asarray(picture, dtype=float) for picture in pictures])
+        unlike = np.abs(values - values[0]).mean(axis=(1, 2, 3))
+        place = width * (number % COLUMNS), height * (number // COLUMNS)
+        whole.paste(pictures[int(np.argmax(unlike))], place)
+    stream = io.BytesIO()
+    whole.save(stream, "WEBP", quality=SHEET_QUALITY, method=6)
+    return stream.getvalue()
 
 
 def _section(motion: Motion) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from controller.studio.library import used
 from controller.studio.literals import Run
 from controller.studio.rewriting import begun, parametrised, unrolled
 from controller.studio.source import Source, first_parameters, parameters, written
@@ -75,6 +76,8 @@ def edited(source: Source, order: Mapping[str, object], motion: str = "") -> Sou
             - "unroll": the innermost loop around it is written out;
             - "parameter": the number of the argument ``name`` becomes one of the motion;
             - "pace": ``.scale_time(value)`` is added to the motion;
+            - "library": the motion of the library with this ``name`` is played behind the call, or
+              as the first one where no ``site`` is given;
             - "begin": the call of ``title`` is put behind a ``Timeline()`` that has none.
 
             ``callers``: of the bar, if it is not the only one that runs in a helper.
@@ -88,11 +91,15 @@ def edited(source: Source, order: Mapping[str, object], motion: str = "") -> Sou
         return source.append(motion, f".scale_time({written(_number(order))})")
     if op == "begin":
         return begun(source, motion, _template(order).code(source))
+    if op == "library":
+        return used(source, motion, None if site is None else site_of(site), order.get("name"))
     if op == "parameter":
         name = str(order.get("name"))
         return parametrised(source, motion, site_of(site), name, run_of(order))
     if not isinstance(op, str) or op not in _EDITS:
-        raise StudioError(unknown_name("edit", str(op), [*_EDITS, "parameter", "pace", "begin"]))
+        raise StudioError(
+            unknown_name("edit", str(op), [*_EDITS, "parameter", "pace", "library", "begin"])
+        )
     return _EDITS[op](source, site_of(site), order)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from controller.studio.source import Slot
+from controller.studio.syntax import Site
 from motions.authoring import Value
 
 if TYPE_CHECKING:
@@ -21,6 +22,16 @@ class Task(Enum):
     CHECK = "check"
     PLAY = "play"  #: in MuJoCo, beside the plan
     MEND = "mend"  #: look for changes that make it possible
+    SPLIT = "split"  #: make two calls of one
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """Where a call is to be made two."""
+
+    site: Site  #: where it ends in the text
+    number: int  #: how often it had run before
+    time: float  #: when [s] of the motion the first one ends
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +43,7 @@ class Order:
     chosen: str | None  #: which of its motions; None for the first
     values: Mapping[str, Value]  #: chosen parameters
     task: Task = Task.CHECK  #: what is done with it
+    cut: Cut | None = None  #: where it is split
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,3 +74,5 @@ class Answer:
     notes: tuple[str, ...] = ()  #: what is to be known of the file, in words
     changes: tuple[tuple[str, str], ...] = ()
     """Calls that make it possible, to be appended to the motion, each with its meaning."""
+    split: tuple[bytes, int] | None = None
+    """The text with one call made two, and the byte behind them."""

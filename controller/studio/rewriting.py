@@ -170,7 +170,7 @@ def parametrised(source: Source, motion: str, site: Site, name: str, run: Run) -
         (slot.span, new),
         _in_signature(syntax, function, _declared(new, slot)),
     ]
-    changes += _imports(syntax)
+    changes += _imports(syntax, {"Annotated": "typing", "Range": "motions"})
     return _changed(source, changes)
 
 
@@ -215,26 +215,38 @@ def _in_signature(syntax: Syntax, function: ast.FunctionDef, text: str) -> Chang
     return (at, at), text
 
 
-def _imports(syntax: Syntax) -> list[Change]:
-    """``Annotated`` and ``Range``, where the file does not have them."""
+def imported(source: Source, wanted: Mapping[str, str]) -> Source:
+    """With names of modules, where the file does not have them; the call that was made is known."""
+    changes = _imports(source.syntax, wanted)
+    if not changes:
+        return source
+    after = _changed(source, changes)
+    end = None if source.site is None else source.offset(source.site)
+    return Source(after.data, end and end + len(after.data) - len(source.data))
+
+
+def _imports(syntax: Syntax, wanted: Mapping[str, str]) -> list[Change]:
+    """Names of modules, where the file does not have them."""
     known, changes = set[str](), list[Change]()
     imports = [one for one in syntax.tree.body if isinstance(one, ast.Import | ast.ImportFrom)]
     for one in imports:
         known |= {alias.asname or alias.name for alias in one.names}
     later = [one for one in imports if getattr(one, "module", "") != "__future__"]
-    if not later:
-        raise StudioError("the file imports nothing: import Annotated and Range in it")
-    at = syntax.starts[later[0].lineno - 1]
-    if "Annotated" not in known:
-        changes.append(((at, at), f"from typing import Annotated{syntax.line_end}"))
-    if "Range" not in known:
-        own = next((one for one in later if getattr(one, "module", "") == "motions"), None)
+    whole = {getattr(one, "module", "") for one in imports if one.names[0].name == "*"}
+    missing = {
+        name: module for name, module in wanted.items() if name not in known and module not in whole
+    }
+    if missing and not later:
+        raise StudioError(f"the file imports nothing: import {' and '.join(missing)} in it")
+    for name, module in missing.items():
+        own = next((one for one in later if getattr(one, "module", "") == module), None)
         if own is None:
-            changes.append(((at, at), f"from motions import Range{syntax.line_end}"))
+            at = syntax.starts[later[0].lineno - 1]
+            changes.append(((at, at), f"from {module} import {name}{syntax.line_end}"))
         else:
             last = own.names[-1]
             end = syntax.starts[(last.end_lineno or 1) - 1] + (last.end_col_offset or 0)
-            changes.append(((end, end), ", Range"))
+            changes.append(((end, end), f", {name}"))
     return changes
 
 

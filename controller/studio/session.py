@@ -12,10 +12,12 @@ from typing import final
 
 import viz
 from controller.studio.edits import PALETTE, edited, run_of, site_of
-from controller.studio.orders import Answer, Bar, Order, Task
+from controller.studio.library import library
+from controller.studio.orders import Answer, Bar, Cut, Order, Task
 from controller.studio.project import Project
 from controller.studio.rewriting import offers
 from controller.studio.running import Runner
+from controller.studio.shows import with_show
 from controller.studio.songs import heard, songs_beside, sound_of
 from controller.studio.source import Source, parameters
 from controller.studio.together import copied, edited_together, pasted
@@ -86,6 +88,7 @@ class Studio:
                     "/edit": self.edit,
                     "/copy": self.copy,
                     "/choose": self.choose,
+                    "/library": lambda _: library(),
                     "/music": self.music,
                     "/play": self.play,
                     "/mend": self.mend,
@@ -103,8 +106,9 @@ class Studio:
         Args:
             order: see ``edited_together``; besides ``op`` "undo" and "redo", "change" (see
                 ``mend``), "offers" (what there is to be done for a bar, by ``site`` and ``number``)
-                and "paste" behind ``site`` what ``copy`` has taken. ``base`` is the
-                state of the file that the page knows, ``commit`` whether to save.
+                and "split" (it, at a ``time``), "show" (a motion that plays all others), and
+                "paste" behind ``site`` what ``copy`` has taken. ``base`` is the state of the file
+                that the page knows, ``commit`` whether to save.
 
         Returns:
             What the page shows next, packed, and of what was saved the ``site`` of the call that
@@ -129,13 +133,16 @@ class Studio:
             (self._project.undo if op == "undo" else self._project.redo)()
             self.show()
             return {}
-        source = self._edited(order)
+        if order.get("op") == "show":
+            source, chosen = with_show(Source(self._project.saved), self._motions)
+        else:
+            source, chosen = self._edited(order), self.motion
         data, site = source.data, dict[str, object](site=source.site)
-        shown = self._run(data)  # what is no motion is not saved
+        shown = self._run(data, chosen=chosen)  # what is no motion is not saved
         if order.get("commit") is True:
             self._project.save(data)
-            self._bars = shown.bars
-            self._server.publish(self._content(shown))
+            self._bars, self.motion = shown.bars, shown.title
+            self._server.publish(self._content(shown), shown.title)
             return site
         return {"data": content_text(self._content(shown), shown.title, is_brief=True)}
 
@@ -143,6 +150,8 @@ class Studio:
         source = Source(self._project.saved)
         if order.get("op") == "paste":
             return pasted(source, order, self._copied)
+        if order.get("op") == "split":
+            return self._split(order)
         if order.get("op") != "change":
             motion = self.motion or ""
             return edited_together(
@@ -152,6 +161,17 @@ class Studio:
         if type(which) is not int or not 0 <= which < len(self._changes):
             raise StudioError("a change is one of those that were proposed")
         return source.append(self.motion or "", self._changes[which])
+
+    def _split(self, order: Mapping[str, object]) -> Source:
+        """Where a way is at an instant is known to what runs the file."""
+        time, number = order.get("time"), order.get("number") or 0
+        if not isinstance(time, int | float) or type(number) is not int:
+            raise StudioError(f"a call is split at a time, got {time!r:.40}")
+        cut = Cut(site_of(order.get("site")), number, float(time))
+        after = self._run(self._project.saved, Task.SPLIT, cut).split
+        if after is None:
+            raise StudioError("there is nothing to split")
+        return Source(*after)
 
     def copy(self, order: Mapping[str, object]) -> dict[str, object]:
         """Keep the calls that end in ``sites``, to be pasted into any motion of the file."""
@@ -246,7 +266,9 @@ class Studio:
     def show(self) -> None:
         """Run what the file says and show it, or why it is no motion."""
         try:
-            self._server.publish(self._content(self._run(self._project.saved)))
+            shown = self._run(self._project.saved)
+            self.motion = shown.title  # another one, if that has gone
+            self._server.publish(self._content(shown), shown.title)
         except StudioError as error:
             self._server.publish_error(str(error))
 
@@ -270,9 +292,17 @@ class Studio:
             self._values = values
             self.show()
 
-    def _run(self, data: bytes, task: Task = Task.CHECK) -> Answer:
-        order = Order(self._project.path, data, self.motion, self._values, task)
-        answer = (self._runner if task is Task.CHECK else self._player).run(order)
+    def _run(
+        self,
+        data: bytes,
+        task: Task = Task.CHECK,
+        cut: Cut | None = None,
+        chosen: str | None = None,
+    ) -> Answer:
+        motion = chosen or self.motion
+        order = Order(self._project.path, data, motion, self._values, task, cut)
+        is_quick = task in (Task.CHECK, Task.SPLIT)
+        answer = (self._runner if is_quick else self._player).run(order)
         if data == self._project.saved and answer.bars:
             self._bars = answer.bars
         return answer

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import final
 
+from controller.studio.layout import placed, tail
 from controller.studio.literals import MEMBERS, Literal, Run, literals, resolved
 from controller.studio.syntax import Site, Span, Syntax, value_of
 from go2_wbc.errors import StudioError, unknown_name
@@ -23,7 +24,6 @@ DEGREES = "deg"  #: the function of the language that takes them
 ANGLES = frozenset({"roll", "pitch", "yaw", "angle", "turn"})
 """Arguments that are added in degrees; the joints of a leg stay in radians."""
 MOTIONS = frozenset({"others", "other"})  #: Arguments that are motions: their calls are bars
-LONGEST_LINE = 100  #: characters; an inserted call that would make it longer gets its own line
 _DIGITS = 4  #: decimals that an edit may add
 
 
@@ -114,7 +114,7 @@ class Source:
             (target,), rest = statement.targets, self._receiver(call)
             if isinstance(target, ast.Name) and self._node(rest) == self._node(target):
                 return self._without_statement(statement)
-        return self.replaced((start, self._tail(end)), "")
+        return self.replaced((start, tail(self.data, end)), "")
 
     def duplicate(self, site: Site) -> Source:
         """With a call made twice, one after the other."""
@@ -126,6 +126,30 @@ class Source:
         layout = re.match(r"\s*", self._text(self._link(call)))
         return self._behind(call, (layout[0] if layout else "") + code)
 
+    def parted(self, site: Site, first: str, second: str) -> Source:
+        """With two calls in the place of one; the second is laid out as that."""
+        start, end = self._link(self._call(site))
+        start = self._dot(start)
+        source = self.replaced((start, end), first, start + len(first.encode()))
+        return source.insert(source.site or site, second)
+
+    def arguments(self, site: Site) -> list[tuple[str, str, bool]]:
+        """Those of a call as they are written: name, text, and whether the name stands there.
+
+        Raises:
+            StudioError: for a call of ``*`` or ``**``.
+        """
+        call = self._call(site)
+        if any(isinstance(node, ast.Starred) for node in call.args):
+            raise StudioError(f"{self._name(call)}() is called with what a * stands for")
+        takes = parameters(self._name(call))
+        found = [(n, self._node(one), False) for n, one in zip(takes, call.args, strict=False)]
+        for word in call.keywords:
+            if word.arg is None:
+                raise StudioError(f"{self._name(call)}() is called with what ** stands for")
+            found.append((word.arg, self._node(word.value), True))
+        return found
+
     def offset(self, site: Site) -> int:
         """The first byte behind a call."""
         return self._span(self._call(site))[1]
@@ -135,18 +159,8 @@ class Source:
         return self._text(self._link(self._call(site))).strip()
 
     def _behind(self, call: ast.Call, text: str) -> Source:
-        """With ``text`` behind a call; as a statement of its own where the line would be long."""
-        (_, end), statement = self._link(call), self._statement(call)
-        if text[:1] in "\r\n":
-            end = self._tail(end)
-        elif isinstance(statement, ast.Assign) and statement.value is call:
-            (start, _), (target,) = self._span(statement), statement.targets
-            first = self.syntax.starts[statement.lineno - 1]
-            if isinstance(target, ast.Name) and end - first + len(text) > LONGEST_LINE:
-                before = self.syntax.line_end + self._text((first, start))
-                text = f"{before}{target.id} = {target.id}{text}"
-                end = self._tail(end)
-        return self.replaced((end, end), text, end + len(text.encode()))
+        """With ``text`` behind a call; where the line would be long, on one of its own."""
+        return self.replaced(*placed(self.syntax, call, self._link(call)[1], text))
 
     def swap(self, site: Site, step: int) -> Source:
         """With a call exchanged for the one before (-1) or after it (1) in its chain."""
@@ -157,7 +171,7 @@ class Source:
             raise StudioError(f"{self._name(call)}() is the {where} call of its chain")
         links = sorted([self._link(call), self._link(other)])
         if all(self._text(link)[0] in "\r\n" for link in links):  # their comments go with them
-            first, second = ((start, self._tail(end)) for start, end in links)
+            first, second = ((start, tail(self.data, end)) for start, end in links)
         else:  # a comment would swallow what came behind it: layout and comments stay
             first, second = links = [(self._dot(start), end) for start, end in links]
         middle = self._text((first[1], second[0]))
@@ -225,11 +239,6 @@ class Source:
     def _dot(self, start: int) -> int:
         """Where a link of a chain begins, behind the white space."""
         return start + len(self.data[start:]) - len(self.data[start:].lstrip())
-
-    def _tail(self, end: int) -> int:
-        """The end of the comment on the line that ends in ``end``."""
-        match = re.compile(rb"[ \t]*#[^\r\n]*").match(self.data, end)
-        return match.end() if match else end
 
     def _name_start(self, call: ast.Call) -> int:
         return self._span(call.func)[1] - len(self._name(call).encode())

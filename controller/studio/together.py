@@ -73,19 +73,19 @@ def _moved(source: Source, order: Mapping[str, object], edit: Edit) -> Source:
         with suppress(StudioError):
             return edit(source, {**order, "op": "swap", "site": list(sites[0])})
     texts = copied(source, order)
-    for site in reversed([site for site in sites if site > target]):
-        source = source.delete(site)
+    end = source.offset(target)
+    for site in reversed(sites):
+        after = source.delete(site)
+        if site < target:
+            end -= len(source.data) - len(after.data)
+        source = after
+    target = source.syntax.site(end)
     source = pasted(source, {"site": list(target)}, texts)
     if order.get("is_ahead") is True:
         if len(texts) > 1:
             raise StudioError("one at a time before the first move of all")
         source = source.swap(source.site or target, -1)
-    end = source.offset(source.site or target)
-    for site in reversed([site for site in sites if site < target]):
-        after = source.delete(site)
-        end -= len(source.data) - len(after.data)
-        source = after
-    return Source(source.data, end)
+    return source
 
 
 def _set_many(source: Source, order: Mapping[str, object], edit: Edit) -> Source:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from controller.studio.literals import Run
 from controller.studio.orders import Answer, Bar, Order, Task
 from controller.studio.source import Source
+from controller.studio.splitting import split
 from go2_wbc.errors import Go2WbcError, StudioError
 from go2_wbc.legs import LEGS, Leg
 
@@ -55,6 +56,10 @@ def _answer(
             found = suggest(line, checker=checker)
             changes = tuple((item.call, item.meaning) for item in found)
             return Answer(motion.name, changes=changes)
+        if order.cut is not None:
+            after = split(Source(order.data), str(order.path), made.marks, order.cut)
+            end = after.offset(after.site) if after.site else 0
+            return Answer(motion.name, split=(after.data, end))
         checked = checker.evaluate(line)
         if order.task is Task.PLAY:
             content, told = _played(checked, checker)

@@ -237,28 +237,27 @@ class Steps(TimelineData):
         """
         goal = [quantity(name, v, FARTHEST_WALK) for name, v in (("x", x), ("y", y))]
         goal.append(quantity("turn", turn))
-        if over is None and not any(goal):
-            raise TimelineError(
-                "walk() needs x, y or turn: where to; or over: how long to step on the spot"
-            )
-        shares = np.linspace(0.0, 1.0, POINTS)[:, None]
-        return self._stepped("walk()", Way(shares * np.array(goal)), over, gait)
+        return self._straight("walk()", "x, y or turn", goal, over, gait)
 
+    @typed("gait", error=TimelineError)
     def turn(self, angle: float, over: float | None = None, *, gait: str = "walk") -> Self:
         """Turn on the spot by ``angle`` [rad], to the left; see ``walk``.
 
         Raises:
             TimelineError: as ``walk``.
         """
-        return self.walk(turn=angle, over=over, gait=gait)
+        goal = [0.0, 0.0, quantity("turn", angle)]
+        return self._straight("turn()", "an angle", goal, over, gait)
 
+    @typed("gait", error=TimelineError)
     def side_step(self, y: float, over: float | None = None, *, gait: str = "walk") -> Self:
         """Go aside by ``y`` [m], to the left; see ``walk``.
 
         Raises:
             TimelineError: as ``walk``.
         """
-        return self.walk(y=y, over=over, gait=gait)
+        goal = [0.0, quantity("y", y, FARTHEST_WALK), 0.0]
+        return self._straight("side_step()", "y", goal, over, gait)
 
     @typed("gait", error=TimelineError)
     def path(
@@ -280,6 +279,16 @@ class Steps(TimelineData):
             TimelineError: for an unknown gait, a raised foot, or a point twice in a row.
         """
         return self._stepped("path()", _way_through(points), over, gait)
+
+    def _straight(
+        self, what: str, needs: str, goal: Sequence[float], over: float | None, gait: str
+    ) -> Self:
+        if over is None and not any(goal):
+            raise TimelineError(
+                f"{what} needs {needs}: where to; or over: how long to step on the spot"
+            )
+        shares = np.linspace(0.0, 1.0, POINTS)[:, None]
+        return self._stepped(what, Way(shares * np.array(goal)), over, gait)
 
     def _stepped(self, what: str, way: Way, over: float | None, name: str) -> Self:
         if name not in STEP_GAITS:
@@ -306,9 +315,10 @@ class Steps(TimelineData):
         least = 2.0 * gait.rest + (rounds - 1.0 + gait.last) * gait.least_period
         if end - start < least - SAME:
             hint = "" if name == "trot" else ', or try gait="trot"'
+            more = "s" if rounds > 1 else ""
             raise TimelineError(
-                f"{what}: {end - start:.2f} s are too short: {rounds} rounds of gait {name!r} take "
-                f"{least:.2f} s at the fastest; give it more time{hint}"
+                f"{what}: {end - start:.2f} s are too short: {rounds} round{more} of gait {name!r} "
+                f"take {least:.2f} s at the fastest; give it more time{hint}"
             )
         return rhythm_within(gait, rounds, end - start)
 

@@ -14,7 +14,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from inspect import signature
 from itertools import islice
 from types import CodeType, FrameType
@@ -43,6 +43,8 @@ class Call:
     callers: tuple[tuple[tuple[int, int], int], ...] = ()
     """Where the calls of the functions of this file end that it runs in, the innermost first, and
     how often they had run before."""
+    before: Timeline | None = field(default=None, compare=False, repr=False)
+    """What it was called on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +110,7 @@ def traced() -> Iterator[None]:
             before = given.pop("self")
             frame = sys._getframe(1)
             place = (frame.f_code.co_filename, _end_of(frame.f_code, frame.f_lasti))
-            done = Call(name, *place, runs[place], given, tuple(callers(frame)))
+            done = Call(name, *place, runs[place], given, tuple(callers(frame)), before)
             runs[place] += 1
             marked = copy(after)  # its keys are checked: marks exclude nothing
             object.__setattr__(marked, "keys", (*after.keys, _mark(before, after, done)))

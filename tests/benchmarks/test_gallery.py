@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 from benchmarks import gallery
+from controller.studio.library import SHEET
 from motions import motion_names
 from tests.viz.synthetic import synthetic_recording
 
@@ -24,6 +25,13 @@ def test_the_page_is_what_the_library_says_and_its_pictures_are_small() -> None:
     files = list(PICTURES.iterdir())
     assert {file.stem for file in files} == set(motion_names())
     assert sum(file.stat().st_size for file in files) <= MOST_BYTES
+
+
+def test_the_sheet_of_the_studio_is_made_of_these_pictures() -> None:
+    with Image.open(SHEET) as sheet, Image.open(io.BytesIO(gallery.sheet(PICTURES))) as now:
+        assert sheet.size == now.size
+        pair = [np.asarray(one.convert("L"), dtype=float) for one in (sheet, now)]
+    assert np.abs(pair[0] - pair[1]).mean() < 1.0, "python -m benchmarks gallery docs"
 
 
 @pytest.mark.parametrize("name", motion_names())

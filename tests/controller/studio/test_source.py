@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from controller.studio.edits import PALETTE, edited
+from controller.studio.layout import LONGEST_LINE
 from controller.studio.literals import Run
 from controller.studio.source import Slot, Source, written
 from controller.studio.syntax import Site
@@ -292,3 +293,56 @@ def test_no_comment_swallows_a_call_that_is_moved(text: str, after: str) -> None
     moved = source.swap((1, text.index(")") + 1), 1)
     assert moved.data.decode() == after
     assert moved.text(moved.site or (0, 0)) == ".hold(0.1)"
+
+
+def _inserted(text: str, call: str, code: str, number: int = 0) -> str:
+    data = f"from motions import Timeline, motion\n\n\n@motion\ndef greet():\n{text}".encode()
+    after = Source(data).insert(_site(data, call, number), code)
+    assert after.site is not None
+    assert after.text(after.site) == code, "what was made is known by its place"
+    return after.data.decode().partition("def greet():\n")[2]
+
+
+LONG = "Timeline().body(z=-0.02, over=0.6).body(z=0.02, over=0.6).hold(0.25).home(over=0.6)"
+
+
+def test_what_makes_a_line_long_goes_into_brackets() -> None:
+    assert _inserted(f"    return {LONG}\n", "home", ".hold(0.5)") == (
+        f"    return (\n        {LONG}\n        .hold(0.5)\n    )\n"
+    )
+    before, behind = LONG[: LONG.index(".hold")], LONG[LONG.index(".hold") :]
+    assert _inserted(f"    return {LONG}  # all\n", "body", ".body(x=0.01, over=0.5)", 1) == (
+        f"    return (\n        {before}\n        .body(x=0.01, over=0.5){behind}\n    )  # all\n"
+    )
+    assert _inserted("    return Timeline().home(over=0.6)\n", "home", ".hold(0.5)") == (
+        "    return Timeline().home(over=0.6).hold(0.5)\n"
+    ), "there is room"
+
+
+def test_what_is_in_brackets_goes_on_in_them() -> None:
+    inside = f"    return (\n        {LONG}\n    )\n"
+    assert _inserted(inside, "home", ".hold(0.5)") == inside.replace(
+        LONG, f"{LONG}\n        .hold(0.5)"
+    )
+    beside = f"    return Timeline().then({LONG})\n"
+    assert _inserted(beside, "home", ".hold(0.5)") == beside.replace(
+        LONG, f"{LONG}\n        .hold(0.5)"
+    )
+    assign = f"    line = ({LONG})\n    return line\n"
+    assert _inserted(assign, "home", ".hold(0.5)") == assign.replace(
+        LONG, f"{LONG}\n        .hold(0.5)"
+    )
+    chained = f"    line = {LONG}  # all\n    return line\n"
+    assert _inserted(chained, "home", ".body(y=0.01, over=0.5)") == chained.replace(
+        "# all\n", "# all\n    line = line.body(y=0.01, over=0.5)\n"
+    )
+
+
+def test_twenty_moves_from_the_palette_make_no_long_line() -> None:
+    data = FILE
+    alone = [title for title in PALETTE if title not in ("Raise a foot", "Put a foot down")]
+    for title in [*alone, *alone][:20]:
+        site = _sites(data)[-1][1]
+        data = edited(Source(data), {"op": "insert", "site": list(site), "title": title}).data
+    assert max(map(len, data.splitlines())) <= LONGEST_LINE
+    assert len(_sites(data)) > len(_sites(FILE)) + 20

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import pytest
 
 from controller.studio.edits import edited
+from controller.studio.layout import LONGEST_LINE
 from controller.studio.source import Source
 from controller.studio.together import copied, edited_together, pasted
 from go2_wbc.errors import StudioError
@@ -80,7 +81,8 @@ def test_calls_go_over_several_lines_and_back() -> None:
     assert _name_at(later, later.site) == ".hold"
     ahead = _move(["foot", "down"], "body")
     moved = '.body(z=-0.03, over=0.6).foot("FR", z=0.1, over=0.5).down("FR", over=0.5).hold(0.4)'
-    assert moved in ahead.data.decode()
+    assert moved in "".join(line.strip() for line in ahead.data.decode().splitlines())
+    assert max(map(len, ahead.data.splitlines())) <= LONGEST_LINE
     assert _name_at(ahead, ahead.site) == ".down"
 
 

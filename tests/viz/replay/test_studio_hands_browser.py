@@ -226,8 +226,9 @@ def test_moves_are_copied_into_another_motion(tab: Tab, file: Path) -> None:
     tab.page.locator("[data-bar='1']").first.click()
     tab.page.keyboard.press("Control+v")
     tab.wait_for(f"{SETTLED} && studio.editor.bars.length === 4")
-    raised = '.foot("FR", z=0.08, over=0.5).down("FR", over=0.5)'
-    pasted = DANCE.replace(".home(over=0.8)", f".home(over=0.8){raised}")
+    one = 'Timeline().pose("bow", over=0.8).home(over=0.8)'
+    two = f'{one}.foot("FR", z=0.08, over=0.5)\n        .down("FR", over=0.5)'
+    pasted = DANCE.replace(f"return {one}", f"return (\n        {two}\n    )")
     assert file.read_text(encoding="utf-8") == pasted
     tab.evaluate("studio.act('undo')")
     tab.wait_for(SETTLED)

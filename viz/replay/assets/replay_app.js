@@ -5,6 +5,12 @@ const END_PAUSE = 1.2; // s that the last picture stays before the replay starts
 const LONG_STEP = 1.0; // s, shift with an arrow key
 
 class Player {
+  /** @type {ReplayData} */ data;
+  /** @type {RobotScene} */ scene;
+  /** @type {any[]} */ charts;
+  /** @type {number} */ time;
+  /** @type {boolean} */ isPlaying;
+
   constructor(data, scene, charts) {
     Object.assign(this, { data, scene, charts, time: 0, speed: 1, isPlaying: false, rest: 0 });
     this.button = document.getElementById("play");
@@ -56,7 +62,7 @@ class Player {
   // "check" or "curves" in the side panel.
   openTab(name) {
     document.getElementById("app").dataset.tab = name;
-    for (const button of document.querySelectorAll("[data-open]")) {
+    for (const button of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-open]"))) {
       button.classList.toggle("on", button.dataset.open === name);
     }
   }
@@ -131,7 +137,7 @@ class Player {
   setSpeed(speed) {
     this.speed = speed;
     this.sound.play(this.isPlaying, this.time, speed);
-    for (const button of document.querySelectorAll("[data-speed]")) {
+    for (const button of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-speed]"))) {
       button.classList.toggle("on", Number(button.dataset.speed) === speed);
     }
   }
@@ -147,7 +153,7 @@ class Player {
 
 function bindControls(player) {
   const each = (name, act) => {
-    for (const button of document.querySelectorAll(`[data-${name}]`)) {
+    for (const button of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(`[data-${name}]`))) {
       button.addEventListener("click", () => {
         act(button.dataset[name]);
         button.blur();
@@ -170,7 +176,7 @@ function bindControls(player) {
   const toggles = { c: "follow", o: "orbit", f: "forces", s: "support", p: "paths" };
   window.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    if (event.target.matches("input, select, textarea")) return; // they take keys themselves
+    if (/** @type {HTMLElement} */ (event.target).matches("input, select, textarea")) return; // they take keys themselves
     const key = event.key.toLowerCase();
     const sign = { arrowleft: -1, arrowright: 1 }[key];
     if (key === " ") player.play(!player.isPlaying);

@@ -11,7 +11,8 @@ function kindOf(name) {
 class Binding extends TimeCanvas {
   constructor(box, data) {
     super(box.querySelector("canvas"), data, 34, 6);
-    Object.assign(this, { box, line: box.querySelector("p") });
+    this.box = box;
+    this.line = box.querySelector("p");
     this.use(data);
   }
 

@@ -12,6 +12,13 @@ const LABEL_COLORS = IS_DARK.matches
 
 // A canvas with a picture that is drawn once per size, and a cursor drawn over it.
 class TimeCanvas {
+  /** @type {HTMLCanvasElement} */ canvas;
+  /** @type {ReplayData} */ data;
+  /** @type {number} */ left;
+  /** @type {number} */ right;
+  /** @type {number} */ time;
+  /** @type {Span} */ view;
+
   constructor(canvas, data, left, right) {
     Object.assign(this, { canvas, data, left, right, time: 0 });
     this.picture = document.createElement("canvas");
@@ -65,6 +72,11 @@ class TimeCanvas {
     const x = this.xAt(t);
     if (x > this.left - 1 && x < this.width - this.right + 1) this.drawCursor(paint, x);
   }
+
+  // What is drawn once, and the cursor over it: of each kind of drawing.
+  draw(paint) {}
+
+  drawCursor(paint, x) {}
 
   // Shows other data.
   use(data) {

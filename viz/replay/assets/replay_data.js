@@ -39,6 +39,11 @@ class Pack {
 
 // One movement at even steps; outside its time the ends are held.
 class Run {
+  /** @type {number} */ rate;
+  /** @type {number} */ frames;
+  /** @type {number} */ end;
+  /** @type {Float32Array} */ q;
+
   constructor(pack, prefix, { rate, frames }) {
     Object.assign(this, { rate, frames, end: (frames - 1) / rate });
     for (const name of ["q", "feet", "com", "target", "forces", "stance", "margin", "torque"]) {

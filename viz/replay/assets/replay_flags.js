@@ -93,7 +93,7 @@ class Flags {
       lead.setAttribute("d", `M${left} ${middle} H${left - 14} L${x} ${y} m-4 0 a4 4 0 1 0 8 0 a4 4 0 1 0 -8 0`);
       top += note.offsetHeight + NOTE_GAP;
     }
-    const more = this.box.querySelector(".more");
+    const more = /** @type {HTMLElement} */ (this.box.querySelector(".more"));
     if (more) more.style.transform = `translate(${width - more.offsetWidth - 18}px, ${top}px)`;
   }
 

@@ -8,6 +8,10 @@ const GHOST_COLORS = { ghost: 0x6d8ff5, written: 0xb8793b };
 
 // A tree of meshes with a base and joints that a configuration moves.
 class Body {
+  /** @type {any} */ root;
+  /** @type {any} */ base;
+  /** @type {{ node: any, axis: any }[]} */ joints;
+
   constructor(root, base, joints) {
     Object.assign(this, { root, base, joints });
   }
@@ -33,9 +37,34 @@ class Body {
     const joints = this.joints.map(({ node, axis }) => ({ node: twins.get(node), axis }));
     return new Body(root, twins.get(this.base), joints);
   }
+
+  // Seen through, in one colour. First the depth alone, so that only its outside is seen; solid
+  // parts win a tie.
+  veil(color, opacity, order) {
+    const { THREE } = MeshCat;
+    const shared = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 };
+    const depth = new THREE.MeshBasicMaterial({ ...shared, colorWrite: false });
+    const skin = new THREE.MeshLambertMaterial({ ...shared, color, transparent: true, opacity, depthWrite: false });
+    const meshes = [];
+    this.root.traverse((item) => item.isMesh && meshes.push(item));
+    for (const mesh of meshes) {
+      mesh.material = depth;
+      mesh.renderOrder = order;
+      const over = new THREE.Mesh(mesh.geometry, skin);
+      mesh.castShadow = mesh.receiveShadow = over.castShadow = over.receiveShadow = false;
+      over.renderOrder = order + 0.1;
+      mesh.add(over);
+    }
+  }
 }
 
 class Ghost {
+  /** @type {RobotScene} */ scene;
+  /** @type {string} */ name;
+  /** @type {string} */ place;
+  /** @type {Run} */ run;
+  /** @type {Body} */ body;
+
   constructor(scene, name) {
     Object.assign(this, { scene, name, place: "beside", run: null });
   }
@@ -57,23 +86,7 @@ class Ghost {
 
   make() {
     this.body = this.scene.body.twin();
-    // First the depth alone, so that only the ghost's outside is seen; solid parts win a tie.
-    const { THREE } = MeshCat;
-    const shared = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 };
-    const depth = new THREE.MeshBasicMaterial({ ...shared, colorWrite: false });
-    const skin = new THREE.MeshLambertMaterial({
-      ...shared, color: GHOST_COLORS[this.name], transparent: true, opacity: GHOST_OPACITY, depthWrite: false,
-    });
-    const meshes = [];
-    this.body.root.traverse((item) => item.isMesh && meshes.push(item));
-    for (const mesh of meshes) {
-      mesh.material = depth;
-      mesh.renderOrder = 0.5;
-      const over = new THREE.Mesh(mesh.geometry, skin);
-      mesh.castShadow = mesh.receiveShadow = over.castShadow = over.receiveShadow = false;
-      over.renderOrder = 0.6;
-      mesh.add(over);
-    }
+    this.body.veil(GHOST_COLORS[this.name], GHOST_OPACITY, 0.5);
     this.scene.viewer.set_object(["meshcat", this.name], this.body.root);
   }
 

@@ -31,7 +31,7 @@ class RobotScene {
     for (const name of ["forces", "contacts", "com"]) this.makeMarker(this.node(name));
     this.makeSupport();
     this.ghosts = Object.keys(GHOST_COLORS).map((name) => new Ghost(this, name));
-    [this.ghost] = this.ghosts; // the plan, which is judged
+    this.ghost = this.ghosts[0]; // the plan, which is judged
     this.steps = new Steps(this);
     this.flags = new Flags(this);
     this.use(data);

@@ -44,7 +44,8 @@ class Hands {
 
   make() {
     const { bar } = this;
-    const had = this.layer.contains(document.activeElement) ? document.activeElement.dataset.hand : null;
+    const focused = /** @type {HTMLElement} */ (document.activeElement);
+    const had = this.layer.contains(focused) ? focused.dataset.hand : null;
     this.hands = bar && isOwn(bar) && !this.player.data.ghost ? handsOf(bar, this.scene.legs) : [];
     this.layer.replaceChildren(...this.hands.map((hand) => this.button(hand)));
     if (had) this.layer.querySelector(`[data-hand="${had}"]`)?.focus();

@@ -4,12 +4,21 @@
 const DRAFT_REST = 60; // ms after the last key that a draft is shown
 
 class Inspector {
+  /** @type {Studio} */ studio;
+  /** @type {Bar} */ bar;
+
   constructor(studio) {
     this.studio = studio;
     this.box = element("section", { id: "inspector", className: "card" });
     this.box.append(element("h2"), element("div"));
   }
 
+  /**
+   * @param {Bar} bar
+   * @param {Editor} editor
+   * @param {string} timeUnit
+   * @param {number} count
+   */
   use(bar, editor, timeUnit, count) {
     if (this.box.contains(document.activeElement) && bar && this.shape === shapeOf(bar)) {
       return this.refresh(bar);
@@ -43,7 +52,7 @@ class Inspector {
   giveUp() {
     this.isGivenUp = true;
     clearTimeout(this.resting);
-    document.activeElement.blur();
+    /** @type {HTMLElement} */ (document.activeElement).blur();
     this.isGivenUp = false;
     this.forget();
   }
@@ -68,6 +77,7 @@ class Inspector {
   }
 
   // Other values in the same fields; the one that is typed into stays.
+  /** @param {Bar} bar */
   refresh(bar) {
     this.bar = bar;
     for (const { name, value } of bar.slots) {
@@ -76,6 +86,12 @@ class Inspector {
     }
   }
 
+  /**
+   * @param {Bar} bar
+   * @param {Slot} slot
+   * @param {Editor} editor
+   * @param {string} timeUnit
+   */
   row(bar, slot, editor, timeUnit) {
     this.bar = bar;
     const row = element("label");
@@ -90,7 +106,7 @@ class Inspector {
     const isWord = typeof slot.value === "string";
     const words = isWord ? [`${bar.name}.${slot.name}`, slot.name, slot.of].map((key) => editor.words[key]).find(Boolean) : null;
     const input = element(words ? "select" : "input");
-    if (words) input.append(...[...new Set([...words, slot.value])].map((word) => new Option(word)));
+    if (words) input.append(...[...new Set([...words, slot.value])].map((word) => new Option(String(word))));
     else Object.assign(input, isWord ? { type: "text" } : { type: "number", step: stepOf(slot) });
     input.value = slot.value;
     input.dataset.slot = slot.name;
@@ -109,6 +125,10 @@ class Inspector {
     return row;
   }
 
+  /**
+   * @param {Bar} bar
+   * @param {Editor} editor
+   */
   adder(bar, editor) {
     const select = element("select", { className: "adder" });
     select.setAttribute("aria-label", "Add an argument");
@@ -121,6 +141,7 @@ class Inspector {
   }
 }
 
+/** @param {Bar} bar */
 function shapeOf(bar) {
   return JSON.stringify([bar.name, bar.site[0], bar.number, bar.runs, bar.slots.map(({ name, span }) => [name, Boolean(span)])]);
 }
@@ -131,6 +152,11 @@ function stepOf({ name, is_angle: isAngle }) {
 }
 
 // What an argument is at first when it is added; angles in degrees.
+/**
+ * @param {Bar} bar
+ * @param {string} name
+ * @param {Editor} editor
+ */
 function firstValue(bar, name, editor) {
   const words = editor.words[`${bar.name}.${name}`] ?? editor.words[name];
   if (words) return words[0];

@@ -5,6 +5,13 @@ const MUSIC_HEIGHT = 40; // px
 const TAP_PAUSE = 2500, LEAST_TAPS = 4, MOST_TAPS = 12; // ms after which tapping begins anew
 
 class Music {
+  /** @type {Studio} */ studio;
+  /** @type {number[]} */ beats;
+  /** @type {Song} */ song;
+  /** @type {number[]} */ taps;
+  /** @type {number} */ metre;
+  /** @type {number} */ downbeat;
+
   constructor(studio) {
     Object.assign(this, { studio, beats: [], song: null, taps: [], metre: 4, downbeat: 0 });
     this.box = element("div", { id: "music", className: "lane", hidden: true });
@@ -34,6 +41,7 @@ class Music {
     });
   }
 
+  /** @param {Editor} editor */
   use({ songs }) {
     const names = ["Music…", ...songs];
     if (this.names !== String(names)) {
@@ -98,10 +106,6 @@ class Music {
       text: `Count ${tempo} beats/min`, hint: "changes bpm() in the file",
       act: () => studio.set(bar, "beats_per_minute", tempo, true),
     }]);
-  }
-
-  show() {
-    // the playhead is drawn over the bars and in the contact strip
   }
 
   draw() {

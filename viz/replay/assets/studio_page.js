@@ -9,6 +9,10 @@ const SLOWER = 1.2; // what the whole is slowed down by at first, where that is 
 const SNAP = 8; // px, a bar that ends this near a beat ends on it
 
 class Studio {
+  /** @type {Editor} */ editor;
+  /** @type {number} */ selected;
+  /** @type {Set<number>} */ chosen;
+
   constructor(player) {
     this.player = player;
     this.selected = null; // place in `bars` of the bar that is edited
@@ -22,6 +26,8 @@ class Studio {
     this.tools = new Tools(this);
     this.inspector = new Inspector(this);
     this.hands = new Hands(this);
+    this.onion = new Onion(this);
+    this.library = new Library(this);
     document.getElementById("timeline").before(this.tools.box, this.music.box, this.tracks.box, this.view.box);
     document.getElementById("sliders").before(this.inspector.box);
     this.charts = player.charts.filter(({ canvas }) => canvas.closest("footer"));
@@ -38,6 +44,10 @@ class Studio {
   }
 
   // Shows what is saved, or what the player has got; calls that were just changed or made are chosen.
+  /**
+   * @param {Editor} editor
+   * @param {[number, number]} site
+   */
   use(editor, site = null) {
     if (!editor?.bars) return; // the player's data, as a chart of it: see `show`
     const isOther = this.editor && this.editor.motion !== editor.motion;
@@ -57,8 +67,8 @@ class Studio {
   show(t) {
     if (this.player.isPlaying) this.view.follow(t);
     this.tracks.show(t);
-    this.music.show(t);
     this.hands.show(t);
+    this.onion.show(t);
   }
 
   onScrub() {}
@@ -158,6 +168,16 @@ class Studio {
     return this.send(orders.length > 1 ? { op: "many", orders } : orders[0], true);
   }
 
+  // The chosen call, or the one that runs there, is made two where the playhead is.
+  split() {
+    const { time } = this.player;
+    const isUnder = ({ span: [start, , end] }) => start < time && time < end;
+    const bar = this.own().find(isUnder) ?? this.editor.bars.find((one) => isOwn(one) && isUnder(one)) ?? this.bar();
+    if (!bar) return this.tell("put the playhead into a move, to make two of it", true);
+    this.made = { count: 2, isLast: true };
+    return this.send({ op: "split", site: bar.site, number: bar.number, time }, true);
+  }
+
   // The calls of the file that are not chosen, by their starts, and before which of them the chosen are.
   order() {
     const sites = new Set(this.own().map((bar) => String(bar.site)));
@@ -201,6 +221,12 @@ class Studio {
     this.send(site ? { op: "insert", site, title, values } : { op: "begin", title }, true);
   }
 
+  // A motion of the library; the robot must be at home there.
+  playBehind(name) {
+    this.made = { count: 1, isLast: true };
+    this.send({ op: "library", site: this.placeOfNew() ?? null, name }, true);
+  }
+
   // The call behind which something new is put: the last that is chosen, else the last of all.
   placeOfNew() {
     const { bars } = this.editor, chosen = this.own();
@@ -211,12 +237,14 @@ class Studio {
 
   // What else can be done with a call, such as writing out its loop: orders with their titles.
   async offers({ site, number }) {
-    const { offers = [] } = await this.post("edit", { op: "offers", site, number, base: this.editor.base });
+    const answer = await this.post("edit", { op: "offers", site, number, base: this.editor.base });
+    const offers = /** @type {(Order & { title: string })[]} */ (answer.offers ?? []);
     return offers.map(({ title, ...order }) => ({
       text: title, hint: "changes the file; Undo takes it back", act: () => this.rewrite({ value: SLOWER, ...order, site, number }),
     }));
   }
 
+  /** @param {Order} order */
   rewrite(order) {
     this.made = { count: 1 };
     this.inspector.forget();
@@ -225,10 +253,21 @@ class Studio {
 
   // A number or word for an argument of the chosen call; a draft is shown, but not saved. Jumps are
   // solved, which takes up to half a minute: only when they are let go.
+  /**
+   * @param {Bar} bar
+   * @param {string} name
+   * @param {number | string} value
+   * @param {boolean} isCommitted
+   */
   set(bar, name, value, isCommitted) {
     this.setMany(bar, { [name]: value }, isCommitted);
   }
 
+  /**
+   * @param {Bar} bar
+   * @param {Record<string, number | string>} values
+   * @param {boolean} isCommitted
+   */
   setMany(bar, values, isCommitted) {
     this.inspector.follow(values);
     if (!isCommitted && bar.parts.includes("robot")) return;
@@ -251,6 +290,11 @@ class Studio {
   }
 
   // The argument with which a call ends at `end` [s], or on a beat at most `room` [s] away.
+  /**
+   * @param {Bar} bar
+   * @param {number} end
+   * @param {number} room
+   */
   durationFor(bar, end, room) {
     const beat = this.beats.find((one) => Math.abs(one - end) < room);
     const nudge = this.timeUnit === "beats" ? BEAT_NUDGE : NUDGE;
@@ -259,6 +303,10 @@ class Studio {
     return Math.max(isOff ? Math.round(1000 * exact) / 1000 : rounded(exact, nudge), nudge);
   }
 
+  /**
+   * @param {Order} order
+   * @param {boolean} isCommitted
+   */
   async send(order, isCommitted) {
     if (this.isBusy) {
       if (!this.waiting || !this.waiting.isCommitted || isCommitted) this.waiting = { order, isCommitted };
@@ -310,6 +358,7 @@ class Studio {
   }
 
   // A draft moves bars; their places in the file are those of what is saved.
+  /** @param {Editor} draft */
   redrawDraft(draft) {
     if (draft.bars.length !== this.editor.bars.length) return;
     this.view.use();
@@ -391,7 +440,9 @@ class Studio {
       b: () => this.play(), "+": () => this.view.zoom(ZOOM_STEP), "=": () => this.view.zoom(ZOOM_STEP),
       "-": () => this.view.zoom(1 / ZOOM_STEP), 0: () => this.view.fit(), z: () => this.zoomToChosen(),
       t: () => this.music.tap(), i: () => this.tools.focus("Insert a move"), "?": () => this.tools.help(),
-      e: () => this.inspector.focus(), l: () => this.focusBars(),
+      e: () => this.inspector.focus(), l: () => this.focusBars(), k: () => this.split(),
+      h: () => this.onion.toggle(), a: () => this.library.open(),
+      ",": () => this.nudge(-1), ".": () => this.nudge(1),
     };
     const commanded = {
       z: () => this.act(event.shiftKey ? "redo" : "undo"), y: () => this.act("redo"), a: () => this.all(),
@@ -404,6 +455,11 @@ class Studio {
     event.stopPropagation();
   }
 
+  // The playhead a step of the clock on, or back.
+  nudge(side) {
+    this.player.scrub(rounded(this.player.time + side * NUDGE, NUDGE));
+  }
+
   focusBars() {
     this.tracks.reveal(this.selected ?? 0);
   }
@@ -413,23 +469,6 @@ class Studio {
     if (!spans.length) return;
     this.view.show([Math.min(...spans.map(([start]) => start)), Math.max(...spans.map((span) => span[2]))]);
   }
-}
-
-// Whether a call stands in the file that is open.
-function isOwn(bar) {
-  return Boolean(bar) && bar.site[0] > 0;
-}
-
-function isAt(bar, site) {
-  return bar.site[0] === site[0] && bar.site[1] === site[1];
-}
-
-// The argument that says how long a call lasts; of a walk without one, what it would say.
-function lengthOf(bar) {
-  const slot = bar.slots.find(({ name }) => ["over", "seconds"].includes(name));
-  if (slot) return slot.span ? slot : null;
-  const takes = bar.more.includes("over") && !bar.parts.includes("robot");
-  return takes ? { name: "over", value: bar.span[2] - bar.span[1] } : null;
 }
 
 function rounded(value, step) {

@@ -4,15 +4,19 @@
 const KEYS = [
   ["Space", "play or pause"], ["L", "to the bars"], ["← →", "the bar before, after; elsewhere a frame back, on"],
   ["↑ ↓", "the lane above, below"], ["Shift + ← →", "choose several"], ["Ctrl + A", "choose all"],
-  ["[ ]", "shorter, longer"], ["Alt + ← →", "earlier, later"], ["D", "duplicate"], ["Delete", "delete"],
+  ["[ ]", "shorter, longer"], ["Alt + ← →", "earlier, later"], ["D", "duplicate"], ["K", "split at the playhead"], [", .", "the playhead 0.05 s back, on"],
+  ["Delete", "delete"],
   ["Ctrl + C, X, V", "copy, cut, paste; also into another motion"], ["Ctrl + Z, Y", "undo, redo"],
-  ["I", "insert a move"], ["E", "to the numbers of the bar"], ["Esc", "as it is saved, nothing chosen"],
+  ["I", "insert a move"], ["A", "play a motion of the library"], ["E", "to the numbers of the bar"], ["Esc", "as it is saved, nothing chosen"],
   ["+ −", "zoom the time; also wheel or two fingers"], ["0", "all of the time"], ["Z", "zoom to what is chosen"],
+  ["H", "onion skins: the robot before and after"],
   ["B", "play in physics"], ["T", "tap the tempo"], ["1 2 3 4", "view from the corner, side, front, above"],
   ["N", "to the next limit that is broken or tight"],
 ];
 
 class Tools {
+  /** @type {Studio} */ studio;
+
   constructor(studio) {
     this.studio = studio;
     this.box = element("div", { id: "studio-tools" });
@@ -25,7 +29,8 @@ class Tools {
     this.changes = element("div", { id: "studio-changes", className: "buttons" });
     this.fill(studio);
     this.notes = element("p", { id: "studio-notes" });
-    this.box.append(this.tabs, this.say, this.robot, this.row, this.changes, this.notes);
+    this.show = this.button("do", "show", "Make a show", "Writes a motion that plays the others one after the other, in the order of the file");
+    this.box.append(this.tabs, this.show, this.say, this.robot, this.row, this.changes, this.notes);
   }
 
   fill(studio) {
@@ -34,14 +39,17 @@ class Tools {
       this.group("History", this.button("op", "undo", "Undo", "Ctrl+Z"), this.button("op", "redo", "Redo", "Ctrl+Y")),
       this.group("Moves",
         this.list("Insert a move", "Insert…", "Puts a move behind the chosen one, or at the end (I)", palette, (title) => studio.insert(title)),
+        this.button("ask", "library", "Library…", "Plays a motion of the library behind the chosen move, or at the end (A)"),
         this.button("op", "duplicate", "Duplicate", "Once more, behind it (D)"),
+        this.button("do", "split", "Split", "Makes two of a move, at the playhead (K)"),
         this.button("op", "delete", "Delete", "Delete"),
         this.button("op", "earlier", "Earlier", "Before the move that comes before it (Alt+left arrow)"),
         this.button("op", "later", "Later", "Behind the move that comes after it (Alt+right arrow)"),
         this.button("do", "copy", "Copy", "Ctrl+C"), this.button("do", "paste", "Paste", "Behind the chosen move, also in another motion of the file (Ctrl+V)")),
       this.group("Time",
         this.icon("zoomOut", "−", "Show more of the time (-)"), this.icon("zoomIn", "+", "Show less of the time, larger (+); also wheel or two fingers"),
-        this.button("do", "fit", "Fit", "Show all of the time (0)")),
+        this.button("do", "fit", "Fit", "Show all of the time (0)"),
+        this.button("do", "onion", "Onion skins", "The robot 0.3 and 0.6 s before the playhead, blue, and after it, orange (H)")),
       studio.music.buttons);
     this.robot = this.group("Robot",
       this.button("ask", "play", "Play in physics", "MuJoCo plays it beside the plan (B)"),
@@ -63,11 +71,12 @@ class Tools {
     button.dataset[kind] = name;
     const { studio } = this;
     const acts = {
-      copy: () => studio.copy(), paste: () => studio.paste(), fit: () => studio.view.fit(),
+      show: () => studio.send({ op: "show" }, true), split: () => studio.split(), onion: () => studio.onion.toggle(), copy: () => studio.copy(), paste: () => studio.paste(), fit: () => studio.view.fit(),
       zoomIn: () => studio.view.zoom(ZOOM_STEP), zoomOut: () => studio.view.zoom(1 / ZOOM_STEP), help: () => this.help(),
     };
     button.addEventListener("click", () => {
       if (kind === "op") studio.act(name);
+      else if (name === "library") studio.library.open();
       else if (kind === "ask") studio[name]();
       else acts[name]();
     });
@@ -96,6 +105,10 @@ class Tools {
     this.box.querySelector(`[aria-label="${label}"]`).focus();
   }
 
+  /**
+   * @param {Editor} editor
+   * @param {any} header
+   */
   use(editor, header) {
     const count = this.studio.own().length;
     const enable = (name, isPossible) => {
@@ -114,6 +127,7 @@ class Tools {
       tab.addEventListener("click", () => motion !== this.studio.editor.motion && this.studio.open(motion));
       return tab;
     });
+    this.show.hidden = tabs.length < 2;
     const name = element("b", { textContent: editor.file });
     name.setAttribute("role", "presentation");
     if (this.shape === `${editor.motion} ${editor.motions}`) return;

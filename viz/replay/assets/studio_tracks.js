@@ -9,6 +9,15 @@ const AHEAD = 40; // px beyond the edges in which bars are kept
 const LABEL_FONT = "600 11px Inter, system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
 
 class Tracks {
+  /** @type {Studio} */ studio;
+  /** @type {TimeView} */ view;
+  /** @type {Editor} */ editor;
+  /** @type {Map<string, HTMLElement>} */ made;
+  /** @type {Map<string, HTMLElement>} */ strips;
+  /** @type {{ bar: Bar, index: number, lane: string, row: number, next: number }[]} */ items;
+  /** @type {{ index: number }} */ dragged;
+  /** @type {number} */ goal;
+
   constructor(studio, view) {
     Object.assign(this, { studio, view, items: [], made: new Map(), dragged: null });
     this.box = element("div", { id: "bars" });
@@ -35,6 +44,7 @@ class Tracks {
   }
 
   // Lanes, and in them rows: bars that run at once lie below each other.
+  /** @param {Editor} editor */
   arrange({ lanes, bars }) {
     this.items = [];
     const found = [];
@@ -114,6 +124,10 @@ class Tracks {
   }
 
   // What a bar says; most answers change few.
+  /**
+   * @param {HTMLElement & { stamp?: string }} button
+   * @param {Tracks["items"][number]} item
+   */
   fill(button, { bar, index, row, lane }) {
     const { chosen, selected } = this.studio;
     const isOn = chosen.has(index);
@@ -125,7 +139,7 @@ class Tracks {
     button.classList.toggle("on", isOn);
     button.classList.toggle("broken", Boolean(bar.broken));
     button.classList.toggle("foreign", !isOwn(bar));
-    button.setAttribute("aria-pressed", isOn);
+    button.setAttribute("aria-pressed", String(isOn));
     button.style.top = `${ROW * row + 1}px`;
     button.title = toldOf(bar);
     button.setAttribute("aria-label", button.title.replaceAll("\n", " "));
@@ -154,6 +168,12 @@ class Tracks {
   }
 
   // The longest label for which there is room in a bar, else beside it, else none.
+  /**
+   * @param {Bar} bar
+   * @param {number} inside
+   * @param {number} beside
+   * @returns {[string, boolean]}
+   */
   label(bar, inside, beside) {
     const again = bar.runs > 1 ? ` ${bar.number + 1}/${bar.runs}` : "";
     const [long, brief] = described(bar);
@@ -320,6 +340,33 @@ function cut(text, room, widthOf) {
 }
 
 // How much of its argument (seconds or beats) a call has a second: also where it is made slower later.
+/** @param {Bar} bar */
 function ratio(bar) {
   return lengthOf(bar).value / Math.max(bar.span[2] - bar.span[1], 1e-6);
+}
+
+// Whether a call stands in the file that is open.
+/** @param {Bar} bar */
+function isOwn(bar) {
+  return Boolean(bar) && bar.site[0] > 0;
+}
+
+/**
+ * @param {Bar} bar
+ * @param {[number, number]} site
+ */
+function isAt(bar, site) {
+  return bar.site[0] === site[0] && bar.site[1] === site[1];
+}
+
+// The argument that says how long a call lasts; of a walk without one, what it would say.
+/**
+ * @param {Bar} bar
+ * @returns {{ name: string, value: number }}
+ */
+function lengthOf(bar) {
+  const slot = bar.slots.find(({ name }) => ["over", "seconds"].includes(name));
+  if (slot) return slot.span ? { name: slot.name, value: Number(slot.value) } : null;
+  const takes = bar.more.includes("over") && !bar.parts.includes("robot");
+  return takes ? { name: "over", value: bar.span[2] - bar.span[1] } : null;
 }

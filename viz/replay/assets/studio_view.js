@@ -5,11 +5,19 @@
 const LEAST_SHOWN = 0.5; // s
 const ZOOM_STEP = 1.4; // of a key or a button
 const WHEEL_RATE = 0.0022; // of the logarithm, for a pixel
+const LEAST_ROOM = 0.4, ROOM = 0.06; // s, and share of the motion: behind its end, into which the last bar is dragged
 const MARGIN_OF_BAR = 0.15; // s around a bar that is zoomed to
 
 class TimeView {
+  /** @type {Player} */ player;
+  /** @type {() => void} */ onChange;
+  /** @type {number} */ from;
+  /** @type {number} */ length;
+  /** @type {boolean} */ isWhole;
+  /** @type {[number, number]} */ pinched;
+
   constructor(player, onChange) {
-    Object.assign(this, { player, onChange, from: 0, length: player.data.duration, isWhole: true });
+    Object.assign(this, { player, onChange, from: 0, length: 0, isWhole: true });
     this.box = element("div", { id: "overview" });
     this.box.setAttribute("role", "scrollbar");
     this.box.setAttribute("aria-label", "Part of the time that is shown");
@@ -28,7 +36,8 @@ class TimeView {
   }
 
   get whole() {
-    return this.player.data.duration;
+    const { duration } = this.player.data;
+    return duration + Math.max(LEAST_ROOM, ROOM * duration);
   }
 
   // After other data have come: what was fitted stays so.
@@ -98,6 +107,7 @@ class TimeView {
       event.preventDefault();
     }, { passive: false });
     const fingers = new Map();
+    /** @returns {[number, number]} */
     const spread = () => {
       const [a, b] = [...fingers.values()];
       return [Math.max(Math.abs(a - b), 20), timeAt((a + b) / 2)];
@@ -115,7 +125,8 @@ class TimeView {
       if (!fingers.has(event.pointerId)) return;
       const passed = event.clientX - fingers.get(event.pointerId);
       fingers.set(event.pointerId, event.clientX);
-      if (fingers.size === 1 && event.target.closest(".lane") && !event.target.closest(".bar, #music")) {
+      const under = /** @type {HTMLElement} */ (event.target);
+      if (fingers.size === 1 && under.closest(".lane") && !under.closest(".bar, #music")) {
         this.pan(-passed / box.clientWidth * this.length); // one finger beside the bars
       }
       if (fingers.size !== 2) return;

@@ -52,6 +52,10 @@ const SIGNS = { Rise: "\u2191", Sink: "\u2193", "Put down": "\u2193", Raise: "\u
   Left: "\u2196", Right: "\u2199", Look: "\u25ce", Walk: "\u2192", Step: "\u2192" };
 
 // What a call does, in a few words and in fewer.
+/**
+ * @param {Bar} bar
+ * @returns {[string, string]}
+ */
 function described(bar) {
   const name = CALL_NAMES[bar.name] ?? readable(bar.name);
   const { values } = bar;
@@ -62,12 +66,12 @@ function described(bar) {
   if (bar.name === "hold") return [`Pause ${amount("seconds", values.seconds)}`.trim(), "Pause"];
   if (bar.name === "bpm") return [`${values.beats_per_minute ?? ""} beats/min`, "Tempo"];
   if (bar.name === "repeat" || bar.name === "hop") return [`${name} ×${values.times ?? "?"}`, name];
-  if (bar.name === "scale_time") return [`${values.factor < 1 ? "Faster" : "Slower"} ×${short(values.factor)}`, "Tempo"];
+  if (bar.name === "scale_time") return [`${Number(values.factor) < 1 ? "Faster" : "Slower"} ×${short(values.factor)}`, "Tempo"];
   if (bar.name === "scale") return [`Size ×${short(values.amplitude)}`, "Size"];
   if (bar.name === "joint") return [`Bend ${values.joint ?? ""} ${amount("angle", values.angle)}`, `Bend ${values.joint ?? ""}`];
   const ways = Object.entries(WAYS[bar.name] ?? {}).filter(([key]) => typeof values[key] === "number" && values[key] !== 0);
   if (!ways.length) return [name, name];
-  const told = ways.map(([key, [more, less]]) => [values[key] > 0 ? more : less, amount(key, Math.abs(values[key]))]);
+  const told = ways.map(([key, [more, less]]) => [Number(values[key]) > 0 ? more : less, amount(key, Math.abs(Number(values[key])))]);
   const [first, ...rest] = told;
   const all = [first.join(" "), ...rest.map(([way, much]) => `${way.toLowerCase()} ${much}`)];
   return [all.join(", "), first[0]];
@@ -86,6 +90,7 @@ function short(value) {
 }
 
 // All that is known of a bar, for a tooltip and for those who hear the page.
+/** @param {Bar} bar */
 function toldOf(bar) {
   const feet = bar.parts.filter((part) => LEG_NAMES[part]).map((part) => LEG_NAMES[part]);
   const whose = feet.length && feet.length < 4 ? `${feet.join(", ")}: ` : "";
@@ -98,6 +103,10 @@ function toldOf(bar) {
   ].filter(Boolean).join("\n");
 }
 
+/**
+ * @param {Slot} slot
+ * @param {string} timeUnit
+ */
 function unitOf({ name, of, is_angle: isAngle }, timeUnit) {
   const names = [name, of, name.split(".").pop()]; // points[0].z is a z
   const isOne = (list) => names.some((one) => list.includes(one));
