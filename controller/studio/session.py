@@ -6,7 +6,7 @@ import hashlib
 import secrets
 import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import final
 
@@ -17,7 +17,7 @@ from controller.studio.project import Project
 from controller.studio.rewriting import offers
 from controller.studio.running import Runner
 from controller.studio.songs import heard, songs_beside, sound_of
-from controller.studio.source import Source, parameters
+from controller.studio.source import Slot, Source, parameters
 from controller.studio.together import copied, edited_together, pasted
 from go2_wbc.curves import Ease
 from go2_wbc.errors import Go2WbcError, StudioError, unknown_name
@@ -311,4 +311,8 @@ def _bar(bar: Bar) -> dict[str, object]:
     """A bar as the page needs it, with the arguments that could be added."""
     given = {slot.of for slot in bar.slots}
     more = [name for name in parameters(bar.name) if name not in given]
-    return {**asdict(bar), "more": more}
+    slots = [{name: getattr(slot, name) for name in _SLOT} for slot in bar.slots]
+    return {**{name: getattr(bar, name) for name in _BAR}, "slots": slots, "more": more}
+
+
+_BAR, _SLOT = (tuple(field.name for field in fields(kind)) for kind in (Bar, Slot))

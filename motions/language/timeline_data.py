@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from copy import copy
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Self, TypeVar
 
@@ -242,13 +243,18 @@ class TimelineData:
         return self._longer([BalanceShift(self.cursor, end, Ease.MINIMUM_JERK, raised)], end)
 
     def _longer(self, keys: Sequence[Key], cursor: float) -> Self:
-        return replace(
-            self,
-            keys=(*self.keys, *keys),
-            cursor=max(cursor, self.floor),
-            last_start=min((key.start for key in keys), default=self.cursor),
-            floor=0.0,
-        )
+        first = min((key.start for key in keys), default=self.cursor)
+        longer = copy(self)  # what it held is checked
+        for name, value in (
+            ("keys", (*self.keys, *keys)),
+            ("cursor", max(cursor, self.floor)),
+            ("last_start", first),
+            ("floor", 0.0),
+        ):
+            object.__setattr__(longer, name, value)
+        longer._require_length(longer.end)
+        _require_no_overlap([*(key for key in self.keys if key.end >= first - SAME), *keys])
+        return longer
 
     def _joined(self, other: TimelineData, start: float) -> Self:
         return self._longer([key.later(start) for key in other.keys], start + other.end)

@@ -92,7 +92,7 @@ def traced() -> Iterator[None]:
             outer = outer.f_back
 
     def tracing(name: str, method: Callable[..., Any]) -> Callable[..., Timeline]:
-        names = signature(method)
+        names = _signature(method)
 
         @functools.wraps(method)
         def call(*args: Any, **kwargs: Any) -> Timeline:  # noqa: ANN401 - as the method says
@@ -130,6 +130,9 @@ def traced() -> Iterator[None]:
 
 
 _OWN = frozenset(vars(Timeline))  #: What is defined there, not inherited
+
+
+_signature = functools.cache(signature)
 
 
 @functools.lru_cache(maxsize=256)
