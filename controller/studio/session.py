@@ -27,7 +27,6 @@ from motions.authoring import Value
 from motions.language.body_and_feet import POSES
 from motions.language.steps import STEP_GAITS
 from viz.content import ReplayContent
-from viz.replay.page_data import content_text
 from viz.replay.preview_server import PreviewServer
 
 HISTORY = ("undo", "redo")
@@ -97,18 +96,19 @@ class Studio:
             raise
         self.url = f"{self._server.url}?token={token}"
 
-    def edit(self, order: Mapping[str, object]) -> dict[str, object]:
+    def edit(self, order: Mapping[str, object]) -> dict[str, object] | bytes:
         """Do what a page asks for.
 
         Args:
             order: see ``edited_together``; besides ``op`` "undo" and "redo", "change" (see
                 ``mend``), "offers" (what there is to be done for a bar, by ``site`` and ``number``)
                 and "paste" behind ``site`` what ``copy`` has taken. ``base`` is the
-                state of the file that the page knows, ``commit`` whether to save.
+                state of the file that the page knows, ``has`` the version of what it shows,
+                ``commit`` whether to save.
 
         Returns:
-            What the page shows next, packed, and of what was saved the ``site`` of the call that
-            was changed or made; or why nothing was done.
+            What the page shows next, see ``PreviewServer.answer``; of what was saved the ``site``
+            of the call that was changed or made; or why nothing was done.
         """
         with self._lock:
             try:
@@ -124,7 +124,7 @@ class Studio:
             except StudioError as error:
                 return {"error": str(error)}
 
-    def _done(self, order: Mapping[str, object]) -> dict[str, object]:
+    def _done(self, order: Mapping[str, object]) -> dict[str, object] | bytes:
         if (op := order.get("op")) in HISTORY:
             (self._project.undo if op == "undo" else self._project.redo)()
             self.show()
@@ -137,7 +137,7 @@ class Studio:
             self._bars = shown.bars
             self._server.publish(self._content(shown))
             return site
-        return {"data": content_text(self._content(shown), shown.title, is_brief=True)}
+        return self._server.answer({}, self._content(shown), shown.title, order.get("has"))
 
     def _edited(self, order: Mapping[str, object]) -> Source:
         source = Source(self._project.saved)
@@ -188,13 +188,14 @@ class Studio:
         except Go2WbcError as error:
             return {"error": str(error)}
 
-    def play(self, _: Mapping[str, object]) -> dict[str, object]:
+    def play(self, order: Mapping[str, object]) -> dict[str, object] | bytes:
         """The motion as it is saved, in MuJoCo beside the plan; or why it could not be played."""
         try:
             shown = self._run(self._project.saved, Task.PLAY)
         except StudioError as error:
             return {"error": str(error)}
-        return {"data": content_text(self._content(shown), shown.title), "told": shown.told}
+        told = {"told": shown.told}
+        return self._server.answer(told, self._content(shown), shown.title, order.get("has"))
 
     def mend(self, _: Mapping[str, object]) -> dict[str, object]:
         """What would make the motion possible, as it is saved; taken by ``op`` "change"."""

@@ -239,9 +239,7 @@ class LinkHulls:
         """Of the links."""
         return tuple(link.name for link in self.links)
 
-    def heights(
-        self, motion: Trajectory, memory: Memory | None = None
-    ) -> Float[np.ndarray, "n k"]:
+    def heights(self, motion: Trajectory, memory: Memory | None = None) -> Float[np.ndarray, "n k"]:
         """Of the lowest point of every link over the ground [m]; see ``LinkHull.heights``.
 
         ``memory``: of motions that are like it.
