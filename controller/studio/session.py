@@ -27,6 +27,7 @@ from motions.authoring import Value
 from motions.language.body_and_feet import POSES
 from motions.language.steps import STEP_GAITS
 from viz.content import ReplayContent
+from viz.replay.page_data import Prepared
 from viz.replay.preview_server import PreviewServer
 
 HISTORY = ("undo", "redo")
@@ -72,11 +73,11 @@ class Studio:
         self._motions: tuple[str, ...] = ()
         self._bars: tuple[Bar, ...] = ()
         try:
-            shown = self._run(self._project.saved)
+            shown = self._run(self._project.saved, Task.EXPORT)
             self.motion = shown.title
             token = secrets.token_urlsafe(16)
             self._server = PreviewServer(
-                self._content(shown),
+                _whole(self._content(shown)),
                 shown.title,
                 port,
                 self._choose,
@@ -219,8 +220,8 @@ class Studio:
         if path.exists() and order.get("again") is not True:
             return {"exists": path.name}
         try:
-            shown = self._run(self._project.saved)
-            content = replace(self._content(shown), editor=None)
+            shown = self._run(self._project.saved, Task.EXPORT)
+            content = replace(_whole(self._content(shown)), editor=None)
             if kind == "html":
                 song = order.get("song")
                 if song in songs_beside(self._project.path):
@@ -273,7 +274,8 @@ class Studio:
 
     def _run(self, data: bytes, task: Task = Task.CHECK) -> Answer:
         order = Order(self._project.path, data, self.motion, self._values, task)
-        answer = (self._runner if task is Task.CHECK else self._player).run(order)
+        is_quick = task in (Task.CHECK, Task.EXPORT)
+        answer = (self._runner if is_quick else self._player).run(order)
         if data == self._project.saved and answer.bars:
             self._bars = answer.bars
         return answer
@@ -286,7 +288,7 @@ class Studio:
                 return {"callers": bar.callers, **order}
         return order
 
-    def _content(self, shown: Answer) -> ReplayContent:
+    def _content(self, shown: Answer) -> ReplayContent | Prepared:
         bars = [_bar(bar) for bar in shown.bars]
         editor = {
             "bars": bars,
@@ -306,6 +308,13 @@ class Studio:
         if shown.content is None:
             raise StudioError("there is nothing to show")
         return replace(shown.content, editor=editor)
+
+
+def _whole(content: ReplayContent | Prepared) -> ReplayContent:
+    """What was asked for as a whole."""
+    if isinstance(content, Prepared):
+        raise TypeError("only what a page needs")
+    return content
 
 
 def _bar(bar: Bar) -> dict[str, object]:

@@ -44,6 +44,7 @@ def _answer(
 ) -> Answer | StudioError:
     from controller.report_view import planned, slider
     from motions import suggest
+    from viz.replay.page_data import prepared
 
     has_run = False
     try:
@@ -68,7 +69,8 @@ def _answer(
     sliders = tuple(slider(item, values.get(item.name, item.default)) for item in motion.parameters)
     bars = tuple(_bars(Source(order.data), str(order.path), made.marks, content))
     content = replace(content, sliders=sliders)
-    return Answer(motion.name, content, bars, made.names, told, made.notes)
+    shown = content if order.task is Task.EXPORT else prepared(content)
+    return Answer(motion.name, shown, bars, made.names, told, made.notes)
 
 
 def _played(checked: CheckedMotion, checker: FeasibilityChecker) -> tuple[ReplayContent, str]:

@@ -16,7 +16,7 @@ import re
 import uuid
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from importlib import resources
 from pathlib import Path
 from types import SimpleNamespace
@@ -210,14 +210,29 @@ def scene_text(recording: Recording) -> str:
     return compressed_text(pack.packed(header).data)
 
 
-def packed_content(content: ReplayContent, title: str, version: str = "") -> Packed:
-    """What happens; ``version`` tells one block of a live page from the next."""
-    pack = Pack()
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """What happens, as a page needs it: a fraction of it."""
+
+    pack: Pack
+    header: Mapping[str, object]
+    is_feasible: bool
+    editor: Mapping[str, object] | None  #: see ``ReplayContent``
+
+    def packed(self, title: str, version: str = "") -> Packed:
+        """All of it; ``version`` tells one block of a live page from the next."""
+        own = {"title": title, "version": version, "editor": self.editor}
+        return self.pack.packed({**self.header, **own})
+
+
+def prepared(content: ReplayContent | Prepared) -> Prepared:
+    """What a page needs of ``content``."""
+    if isinstance(content, Prepared):
+        return content
+    pack, verdict = Pack(), content.verdict
     rate, frames = replay_frames(content.recording)
     highest = float(np.percentile(frames["forces"], _FORCE_PERCENTILE))
     header: dict[str, object] = {
-        "title": title,
-        "version": version,
         "is_plan": content.is_plan,
         **_add_frames(pack, "", rate, frames),
         "labels": [[s.start, s.end, s.label] for s in content.recording.spans()],
@@ -227,7 +242,6 @@ def packed_content(content: ReplayContent, title: str, version: str = "") -> Pac
         "end_pose": content.end_pose,
         "has_sound": bool(content.sound),
         "sliders": [asdict(slider) for slider in content.sliders],
-        "editor": content.editor,
         "verdict": None,
         "ghost": None,
         "ground": None,
@@ -244,12 +258,12 @@ def packed_content(content: ReplayContent, title: str, version: str = "") -> Pac
         header["ground"] = {**place, "low": float(np.nanmin(grid.z)), "colors": COLORS}
     if content.sound:
         pack.add("sound", np.frombuffer(content.sound, np.uint8))
-    if content.verdict is not None:
-        header["verdict"] = _add_verdict(pack, content.verdict)
+    if verdict is not None:
+        header["verdict"] = _add_verdict(pack, verdict)
     for name, other in (("ghost", content.ghost), ("written", content.written)):
         if other is not None:
             header[name] = _add_frames(pack, f"{name}.", *replay_frames(other))
-    return pack.packed(header)
+    return Prepared(pack, header, verdict is None or verdict.ok, content.editor)
 
 
 def replay_frames(recording: Recording) -> tuple[float, dict[str, np.ndarray]]:
@@ -381,7 +395,7 @@ def export_html(shown: Recording | ReplayContent, path: Path, *, title: str) -> 
 def replay_html(shown: Recording | ReplayContent, *, title: str) -> str:
     """The page of ``export_html`` as text; raises as it does, but for the path."""
     content = checked_content(shown)
-    data = compressed_text(packed_content(content, title).data)
+    data = compressed_text(prepared(content).packed(title).data)
     page = page_text(title, scene_text(content.recording), data)
     if (size := len(page.encode())) > PAGE_LIMIT:
         raise ConfigError(

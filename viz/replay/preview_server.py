@@ -23,7 +23,7 @@ from urllib.parse import parse_qs, urlsplit
 from go2_wbc.errors import ConfigError
 from viz.content import ReplayContent, checked_content
 from viz.replay.packing import Packed, compressed_text, message
-from viz.replay.page_data import packed_content, page_text, scene_text
+from viz.replay.page_data import Prepared, page_text, prepared, scene_text
 
 _log = logging.getLogger(__name__)
 
@@ -119,14 +119,18 @@ class PreviewServer(ThreadingHTTPServer):
             return message({}, self._shown, self._sent.get(str(has)))
 
     def answer(
-        self, told: Mapping[str, object], content: ReplayContent, title: str, has: object
+        self,
+        told: Mapping[str, object],
+        content: ReplayContent | Prepared,
+        title: str,
+        has: object,
     ) -> bytes:
         """Something else for the page that asks, with what it is ``told``; see ``changes``."""
         with self._changed:
             old = self._sent.get(str(has))
-            return message(told, self._packed(content, title, uuid.uuid4().hex), old)
+            return message(told, self._packed(prepared(content), title, uuid.uuid4().hex), old)
 
-    def publish(self, content: ReplayContent, title: str = "") -> None:
+    def publish(self, content: ReplayContent | Prepared, title: str = "") -> None:
         """Show this from now on, under another title if there is one, and no error.
 
         Raises:
@@ -187,14 +191,16 @@ class PreviewServer(ThreadingHTTPServer):
         """Log what went wrong in an answer; the page may have been closed meanwhile."""
         _log.info("no answer to %s", client_address, exc_info=True)
 
-    def _pack(self, content: ReplayContent) -> None:
+    def _pack(self, content: ReplayContent | Prepared) -> None:
+        if isinstance(content, ReplayContent):
+            content = prepared(checked_content(content))
         self._version, self._error, self._broken_since = uuid.uuid4().hex, None, ""
-        self._shown = self._packed(checked_content(content), self._title, self._version)
-        self._is_feasible = content.verdict is None or content.verdict.ok
+        self._shown = self._packed(content, self._title, self._version)
+        self._is_feasible = content.is_feasible
 
-    def _packed(self, content: ReplayContent, title: str, version: str) -> Packed:
+    def _packed(self, content: Prepared, title: str, version: str) -> Packed:
         """It under a version of its own, by which it is known until ``_KEPT`` others are."""
-        self._sent[version] = packed_content(content, title, version)
+        self._sent[version] = content.packed(title, version)
         for old in [*self._sent][:-_KEPT]:
             del self._sent[old]
         return self._sent[version]

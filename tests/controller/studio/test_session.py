@@ -325,7 +325,7 @@ def test_a_bar_of_a_helper_is_edited_where_it_is_called(studio: Studio, file: Pa
     site, base = bars[2]["site"], editor["base"]
     offers = {"op": "offers", "site": site, "number": 2, "base": base}
     offered = _told(studio, offers)["offers"]
-    assert [offer["op"] for offer in offered] == ["parameter", "pace"]  # type: ignore[index, union-attr]
+    assert [offer["op"] for offer in offered] == ["parameter", "pace"]
     order = {"op": "set", "site": site, "number": 2, "name": "pitch", "value": 6.5, "base": base}
     assert "error" not in _told(studio, {**order, "commit": True})
     assert file.read_text(encoding="utf-8") == HELPERS.replace("4.0, 3.0", "4.0, 6.5")
