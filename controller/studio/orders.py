@@ -57,9 +57,8 @@ class Answer:
     """What came of an order."""
 
     title: str  #: name of the motion
-    content: ReplayContent | Prepared | None = (
-        None  #: the plan with its verdict, and how it was played
-    )
+    content: ReplayContent | Prepared | None = None
+    """The plan with its verdict, and how it was played."""
     bars: tuple[Bar, ...] = ()  #: by their starts
     motions: tuple[str, ...] = ()  #: all that the file defines
     told: str = ""  #: how playing went, in words
