@@ -96,6 +96,7 @@ class Studio:
             self._end()
             raise
         self.url = f"{self._server.url}?token={token}"
+        self._player.warm()
 
     def edit(self, order: Mapping[str, object]) -> dict[str, object] | bytes:
         """Do what a page asks for.

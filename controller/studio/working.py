@@ -24,16 +24,22 @@ if TYPE_CHECKING:
 
 
 def serve(pipe: Connection) -> None:
-    """Answer orders: a word once the robot is loaded, one when the file has run, and the answer."""
+    """Answer orders: a word once the robot is loaded, one when the file has run, and the answer.
+
+    A first order that is ``None`` has it play something before that word: then all of it is loaded.
+    """
     with suppress(EOFError, KeyboardInterrupt):
-        order: Order = pipe.recv()
+        order: Order | None = pipe.recv()
         from controller.studio.making import Maker
-        from motions import FeasibilityChecker
+        from motions import FeasibilityChecker, Timeline
         from motions.memory import Memory
 
         checker = FeasibilityChecker(memory=Memory())  # most of a motion is as it was
         maker = Maker()
+        if order is None:
+            _played(checker.evaluate(Timeline().body(z=-0.01, over=0.2)), checker)
         pipe.send("loaded")
+        order = order or pipe.recv()
         while True:
             pipe.send(_answer(order, checker, maker, pipe))
             order = pipe.recv()
