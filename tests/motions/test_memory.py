@@ -146,7 +146,7 @@ def test_rows_that_differ_by_rounding_are_the_same_and_others_are_not() -> None:
 
 def test_a_foot_bears_nothing_at_its_touchdown(model: RobotModel) -> None:
     """Or the others share the load as over four feet, if rounding says so: seen in 15 of 400."""
-    for over in np.arange(0.4, 0.9, 0.02):
+    for over in np.arange(0.4, 0.9, 0.02).tolist():
         line = Timeline().foot("FR", z=0.06, over=over).down("FR", over=over).home(over=0.6)
         share = trajectory_of(compile_timeline(line, model), model).load_share
         assert ((share == 0.0) | (share > LEAST_SHARE)).all()
