@@ -96,6 +96,9 @@ class Studio:
             self._end()
             raise
         self.url = f"{self._server.url}?token={token}"
+
+    def warm(self) -> None:
+        """Load what playing takes, meanwhile: the first time then is as short as the others."""
         self._player.warm()
 
     def edit(self, order: Mapping[str, object]) -> dict[str, object] | bytes:

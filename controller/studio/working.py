@@ -39,9 +39,9 @@ def serve(pipe: Connection) -> None:
         if order is None:
             _played(checker.evaluate(Timeline().body(z=-0.01, over=0.2)), checker)
         pipe.send("loaded")
-        order = order or pipe.recv()
         while True:
-            pipe.send(_answer(order, checker, maker, pipe))
+            if order is not None:
+                pipe.send(_answer(order, checker, maker, pipe))
             order = pipe.recv()
 
 

@@ -210,6 +210,7 @@ def test_a_motion_that_cannot_be_done_is_made_possible(studio: Studio, file: Pat
 
 
 def test_physics_plays_it_beside_the_plan(studio: Studio) -> None:
+    studio.warm()
     answer = studio.play({})
     assert isinstance(answer, bytes)
     told, data = read_message(answer)
