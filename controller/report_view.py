@@ -195,11 +195,11 @@ def parts_of(subject: str) -> tuple[str, ...]:
 
 
 def _curve(series: Series) -> MarginCurve:
-    known = np.where(np.isnan(series.margins), np.inf, series.margins)
-    worst, least = np.zeros(len(known), dtype=int), known[:, 0].copy()
-    for column in range(1, known.shape[1]):  # over rows as short as these argmin() takes longer
-        worst[known[:, column] < least] = column
-        np.minimum(least, known[:, column], out=least)
+    worst, least = np.zeros(len(series.times), dtype=int), series.margins[:, 0].copy()
+    for column in range(1, series.margins.shape[1]):  # of rows so short argmin() takes longer
+        one = series.margins[:, column]
+        worst[(one < least) | (np.isnan(least) & ~np.isnan(one))] = column
+        np.fmin(least, one, out=least)
     return MarginCurve(
         name=series.check,
         unit=series.unit,

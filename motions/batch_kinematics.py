@@ -108,15 +108,16 @@ def angles_of(R: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, "n 3"]:
 
 
 def turned(R: Float[np.ndarray, "n 3 3"], p: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-    """R p of every row."""
-    return (R @ p[:, :, None])[:, :, 0]
+    """R p of every row; summed up by columns, which is faster than as many small products."""
+    x, y, z = p.T[:, :, None]
+    return R[:, :, 0] * x + R[:, :, 1] * y + R[:, :, 2] * z
 
 
 def turned_back(
     R: Float[np.ndarray, "n 3 3"], p: Float[np.ndarray, "n 3"]
 ) -> Float[np.ndarray, "n 3"]:
     """R' p of every row."""
-    return (p[:, None] @ R)[:, 0]
+    return turned(R.transpose(0, 2, 1), p)
 
 
 def configurations(
@@ -161,7 +162,9 @@ def rates(
 
     R = attitudes(rpy)
     spline = CubicSpline(times, np.hstack([q[:, :3], rpy, q[:, 7:]]), bc_type="clamped")
-    rate, acceleration = spline(times, 1), spline(times, 2)
+    (_, half, slope, _), end = spline.c, times[-1:]  # of each piece where it begins
+    rate = np.vstack([slope, spline(end, 1)])
+    acceleration = np.vstack([2.0 * half, spline(end, 2)])
     turning = _angular_rates(rpy, rate[:, 3:6], acceleration[:, 3:6])
     v, a = turned_back(R, rate[:, :3]), turned_back(R, acceleration[:, :3])
     w, dw = (turned_back(R, vectors) for vectors in turning)

@@ -12,7 +12,7 @@ from collections.abc import Callable, Hashable
 from typing import Any, TypeVar, final
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, UInt64
 
 QUANTUM = 1e-7
 """What numbers are rounded to [m, rad and what is made of them]: times that are shifted change
@@ -21,6 +21,7 @@ MOST_ROWS, MOST_PARTS = 40_000, 2_000  #: How many are kept of a kind; beyond th
 LEAST_ROOM = 1024  #: Rows that there is room for at first
 Rows = Int[np.ndarray, " rows"]
 Numbers = Float[np.ndarray, "n k"]
+Keys = UInt64[np.ndarray, " _"]
 Kept = TypeVar("Kept")
 
 
@@ -30,6 +31,20 @@ class _Kind:
     def __init__(self) -> None:
         self.places = dict[int, int]()
         self.count, self.values = 0, np.empty((0, 0))
+        self.last: tuple[Keys, Rows] = np.empty(0, np.uint64), np.empty(0, int)
+
+    def found(self, keys: Keys) -> Rows:
+        """Where what is known of these rows is; -1 where nothing is.
+
+        Most rows are those of the last time, but for some in the middle.
+        """
+        known, where = self.last
+        count = min(len(keys), len(known))
+        ahead = _same(keys[:count], known[:count])
+        behind = _same(keys[ahead:][::-1], known[ahead:][::-1])
+        middle = keys[ahead : len(keys) - behind].tolist()
+        between = np.array([self.places.get(key, -1) for key in middle], dtype=int)
+        return np.concatenate([where[:ahead], between, where[len(where) - behind :]])
 
     def add(self, found: Numbers) -> Rows:
         """Keep them; where they are."""
@@ -65,22 +80,30 @@ class Memory:
     ) -> Float[np.ndarray, "n m"]:
         """What ``work`` gives for these rows of ``given``, asked only for those that are new."""
         kind, keys = self._kinds.setdefault(name, _Kind()), self._keys(given)
-        places = np.array([kind.places.get(key, -1) for key in keys])
+        places = kind.found(keys)
         new = np.flatnonzero(places < 0)
         if len(new):
             if kind.count + len(new) > MOST_ROWS:
                 self._kinds[name] = kind = _Kind()
                 new = np.arange(len(keys))
             places[new] = kind.add(work(new))
-            kind.places.update((keys[row], int(places[row])) for row in new.tolist())
+            kind.places.update(zip(keys[new].tolist(), places[new].tolist(), strict=True))
+        kind.last = keys, places
         return kind.values[places]
 
-    def _keys(self, given: Numbers) -> list[int]:
+    def _keys(self, given: Numbers) -> Keys:
         """A number of 64 bits for every row: equal for equal ones, else it is a chance in 2^64."""
         whole = np.rint(given / QUANTUM).astype(np.int64).view(np.uint64)
         mixed = whole * self._factors[: whole.shape[1]]
         mixed ^= mixed >> np.uint64(29)
-        return np.einsum("ij,j->i", mixed, self._factors[-whole.shape[1] :]).tolist()
+        return np.einsum("ij,j->i", mixed, self._factors[-whole.shape[1] :])
+
+
+def _same(one: Keys, other: Keys) -> int:
+    """How many at the beginning are equal."""
+    count = min(len(one), len(other))
+    differ = np.flatnonzero(one[:count] != other[:count])
+    return int(differ[0]) if len(differ) else count
 
 
 def by_rows(

@@ -92,21 +92,22 @@ def load_file(path: Path | str) -> Mapping[str, Motion]:
 def load_text(file: Path, data: bytes) -> Mapping[str, Motion]:
     """The motions that ``file`` would define if it held ``data``; raises as ``load_file``."""
     path = str(file.resolve())
+    made, tree = _run(file, path, data)
     own = {
         item.name: item
-        for item in _run(file, path, data).values()
+        for item in made.values()
         if isinstance(item, Motion) and item.source.startswith(path)
     }
     if not own:
         raise TimelineError(f"{file} defines no motion: write a function with @motion")
-    _require_own_names(file, data, set(own))
+    _require_own_names(file, tree, set(own))
     return own
 
 
-def _require_own_names(file: Path, data: bytes, names: set[str]) -> None:
+def _require_own_names(file: Path, tree: ast.Module, names: set[str]) -> None:
     """The second of two functions of one name would silently take the place of the first."""
     first_lines: dict[str, int] = {}
-    for node in ast.parse(data).body:
+    for node in tree.body:
         if isinstance(node, ast.FunctionDef) and node.name in names:
             if node.name in first_lines:
                 lines = f"lines {first_lines[node.name]} and {node.lineno}"
@@ -114,18 +115,22 @@ def _require_own_names(file: Path, data: bytes, names: set[str]) -> None:
             first_lines[node.name] = node.lineno
 
 
-def _run(file: Path, path: str, data: bytes) -> Mapping[str, Any]:
-    """What the text sets: never cached bytecode, which would miss two saves within a second."""
+def _run(file: Path, path: str, data: bytes) -> tuple[Mapping[str, Any], ast.Module]:
+    """What the text sets, and its tree.
+
+    Never cached bytecode, which would miss two saves within a second.
+    """
     module = ModuleType(f"_motion_file_{file.stem}")
     module.__file__ = path
     sys.modules[module.__name__] = module  # dataclasses look their annotations up there
     try:
-        exec(compile(data, path, "exec"), vars(module))
+        tree = ast.parse(data, path)
+        exec(compile(tree, path, "exec"), vars(module))
     except Exception as error:
         raise TimelineError(f"{_place(file, error)}: {type(error).__name__}: {error}") from error
     finally:
         sys.modules.pop(module.__name__, None)
-    return vars(module)
+    return vars(module), tree
 
 
 def _place(file: Path, error: Exception) -> str:

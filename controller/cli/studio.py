@@ -52,6 +52,7 @@ def run(
                 print(f"{studio.motion}: {studio.url}   (edits {shown_path(path)}; Ctrl-C ends)")
             if not live.no_open and display_problem() is None:
                 webbrowser.open(studio.url)
+            studio.warm()
             while True:
                 time.sleep(POLL_PERIOD)
                 studio.look()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -45,6 +46,7 @@ class Maker:
     def __init__(self) -> None:
         self._is_random = dict[tuple[Path, str], bool]()
         self._read = dict[str, int]()
+        self._others = defaultdict[Path, set[str]](set)
 
     def make(self, order: Order) -> Made:
         """Run the text; raises TimelineError if it is no motion, says the line."""
@@ -54,7 +56,7 @@ class Maker:
         sys.dont_write_bytecode = True  # of two saves within a second the first would stay
         self._forget_changed(order.path.parent)
         made = self._made(order)
-        self._read = _written(order.path.parent)
+        self._read = self._written(order.path.parent)
         which = order.path, made.motion.name
         if which not in self._is_random:
             self._is_random[which] = _moves(made.line) != _moves(self._made(order).line)
@@ -76,20 +78,24 @@ class Maker:
 
     def _forget_changed(self, folder: Path) -> None:
         """Have what is imported from ``folder`` read again if any of it was written meanwhile."""
-        if _written(folder) != self._read:
-            for name in _written(folder):
+        if (now := self._written(folder)) != self._read:
+            for name in now:
                 del sys.modules[name]
 
+    def _written(self, folder: Path) -> dict[str, int]:
+        """When each module was written that was imported from a folder [ns]; 0 of one that is gone.
 
-def _written(folder: Path) -> dict[str, int]:
-    """When each module that was imported from a folder was written [ns]; 0 of one that is gone."""
-    found, start = dict[str, int](), f"{folder}{os.sep}"
-    for name, module in list(sys.modules.items()):
-        file = getattr(module, "__file__", None) or ""
-        if file.startswith(start) and not PACKAGES & {*Path(file).parts}:
+        A module that is from elsewhere stays so.
+        """
+        found, others, start = dict[str, int](), self._others[folder], f"{folder}{os.sep}"
+        for name in sys.modules.keys() - others:
+            file = getattr(sys.modules[name], "__file__", None) or ""
             path = Path(file)
-            found[name] = path.stat().st_mtime_ns if path.exists() else 0
-    return found
+            if file.startswith(start) and not PACKAGES & {*path.parts}:
+                found[name] = path.stat().st_mtime_ns if path.exists() else 0
+            else:
+                others.add(name)
+        return found
 
 
 def _moves(line: Timeline) -> list[Key]:

@@ -14,12 +14,14 @@ from motions.authoring import Value
 
 if TYPE_CHECKING:
     from viz.content import ReplayContent
+    from viz.replay.page_data import Prepared
 
 
 class Task(Enum):
     """What is to be done with a motion."""
 
     CHECK = "check"
+    EXPORT = "export"  #: check, and have all of the content, not only what the page needs
     PLAY = "play"  #: in MuJoCo, beside the plan
     MEND = "mend"  #: look for changes that make it possible
     SPLIT = "split"  #: make two calls of one
@@ -67,7 +69,8 @@ class Answer:
     """What came of an order."""
 
     title: str  #: name of the motion
-    content: ReplayContent | None = None  #: the plan with its verdict, and how it was played
+    content: ReplayContent | Prepared | None = None
+    """The plan with its verdict, and how it was played."""
     bars: tuple[Bar, ...] = ()  #: by their starts
     motions: tuple[str, ...] = ()  #: all that the file defines
     told: str = ""  #: how playing went, in words

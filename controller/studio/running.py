@@ -41,6 +41,12 @@ class Runner:
         there.close()
         self._is_warm = False
 
+    def warm(self) -> None:
+        """Load all that playing takes, meanwhile; the first order waits for it."""
+        with self._lock:
+            if not self._is_warm:
+                self._pipe.send(None)
+
     def run(self, order: Order) -> Answer:
         """What came of the order.
 

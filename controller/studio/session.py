@@ -6,7 +6,7 @@ import hashlib
 import secrets
 import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import final
 
@@ -19,7 +19,7 @@ from controller.studio.rewriting import offers
 from controller.studio.running import Runner
 from controller.studio.shows import with_show
 from controller.studio.songs import heard, songs_beside, sound_of
-from controller.studio.source import Source, parameters
+from controller.studio.source import Slot, Source, parameters
 from controller.studio.together import copied, edited_together, pasted
 from go2_wbc.curves import Ease
 from go2_wbc.errors import Go2WbcError, StudioError, unknown_name
@@ -29,7 +29,7 @@ from motions.authoring import Value
 from motions.language.body_and_feet import POSES
 from motions.language.steps import STEP_GAITS
 from viz.content import ReplayContent
-from viz.replay.page_data import content_text
+from viz.replay.page_data import Prepared
 from viz.replay.preview_server import PreviewServer
 
 HISTORY = ("undo", "redo")
@@ -75,11 +75,11 @@ class Studio:
         self._motions: tuple[str, ...] = ()
         self._bars: tuple[Bar, ...] = ()
         try:
-            shown = self._run(self._project.saved)
+            shown = self._run(self._project.saved, Task.EXPORT)
             self.motion = shown.title
             token = secrets.token_urlsafe(16)
             self._server = PreviewServer(
-                self._content(shown),
+                _whole(self._content(shown)),
                 shown.title,
                 port,
                 self._choose,
@@ -100,7 +100,11 @@ class Studio:
             raise
         self.url = f"{self._server.url}?token={token}"
 
-    def edit(self, order: Mapping[str, object]) -> dict[str, object]:
+    def warm(self) -> None:
+        """Load what playing takes, meanwhile: the first time then is as short as the others."""
+        self._player.warm()
+
+    def edit(self, order: Mapping[str, object]) -> dict[str, object] | bytes:
         """Do what a page asks for.
 
         Args:
@@ -108,11 +112,12 @@ class Studio:
                 ``mend``), "offers" (what there is to be done for a bar, by ``site`` and ``number``)
                 and "split" (it, at a ``time``), "show" (a motion that plays all others), and
                 "paste" behind ``site`` what ``copy`` has taken. ``base`` is the state of the file
-                that the page knows, ``commit`` whether to save.
+                that the page knows, ``has`` the version of what it shows, ``commit`` whether to
+                save.
 
         Returns:
-            What the page shows next, packed, and of what was saved the ``site`` of the call that
-            was changed or made; or why nothing was done.
+            What the page shows next, see ``PreviewServer.answer``; of what was saved the ``site``
+            of the call that was changed or made; or why nothing was done.
         """
         with self._lock:
             try:
@@ -128,7 +133,7 @@ class Studio:
             except StudioError as error:
                 return {"error": str(error)}
 
-    def _done(self, order: Mapping[str, object]) -> dict[str, object]:
+    def _done(self, order: Mapping[str, object]) -> dict[str, object] | bytes:
         if (op := order.get("op")) in HISTORY:
             (self._project.undo if op == "undo" else self._project.redo)()
             self.show()
@@ -144,7 +149,7 @@ class Studio:
             self._bars, self.motion = shown.bars, shown.title
             self._server.publish(self._content(shown), shown.title)
             return site
-        return {"data": content_text(self._content(shown), shown.title, is_brief=True)}
+        return self._server.answer({}, self._content(shown), shown.title, order.get("has"))
 
     def _edited(self, order: Mapping[str, object]) -> Source:
         source = Source(self._project.saved)
@@ -208,13 +213,14 @@ class Studio:
         except Go2WbcError as error:
             return {"error": str(error)}
 
-    def play(self, _: Mapping[str, object]) -> dict[str, object]:
+    def play(self, order: Mapping[str, object]) -> dict[str, object] | bytes:
         """The motion as it is saved, in MuJoCo beside the plan; or why it could not be played."""
         try:
             shown = self._run(self._project.saved, Task.PLAY)
         except StudioError as error:
             return {"error": str(error)}
-        return {"data": content_text(self._content(shown), shown.title), "told": shown.told}
+        told = {"told": shown.told}
+        return self._server.answer(told, self._content(shown), shown.title, order.get("has"))
 
     def mend(self, _: Mapping[str, object]) -> dict[str, object]:
         """What would make the motion possible, as it is saved; taken by ``op`` "change"."""
@@ -238,8 +244,8 @@ class Studio:
         if path.exists() and order.get("again") is not True:
             return {"exists": path.name}
         try:
-            shown = self._run(self._project.saved)
-            content = replace(self._content(shown), editor=None)
+            shown = self._run(self._project.saved, Task.EXPORT)
+            content = replace(_whole(self._content(shown)), editor=None)
             if kind == "html":
                 song = order.get("song")
                 if song in songs_beside(self._project.path):
@@ -301,7 +307,7 @@ class Studio:
     ) -> Answer:
         motion = chosen or self.motion
         order = Order(self._project.path, data, motion, self._values, task, cut)
-        is_quick = task in (Task.CHECK, Task.SPLIT)
+        is_quick = task in (Task.CHECK, Task.EXPORT, Task.SPLIT)
         answer = (self._runner if is_quick else self._player).run(order)
         if data == self._project.saved and answer.bars:
             self._bars = answer.bars
@@ -315,7 +321,7 @@ class Studio:
                 return {"callers": bar.callers, **order}
         return order
 
-    def _content(self, shown: Answer) -> ReplayContent:
+    def _content(self, shown: Answer) -> ReplayContent | Prepared:
         bars = [_bar(bar) for bar in shown.bars]
         editor = {
             "bars": bars,
@@ -337,8 +343,19 @@ class Studio:
         return replace(shown.content, editor=editor)
 
 
+def _whole(content: ReplayContent | Prepared) -> ReplayContent:
+    """What was asked for as a whole."""
+    if isinstance(content, Prepared):
+        raise TypeError("only what a page needs")
+    return content
+
+
 def _bar(bar: Bar) -> dict[str, object]:
     """A bar as the page needs it, with the arguments that could be added."""
     given = {slot.of for slot in bar.slots}
     more = [name for name in parameters(bar.name) if name not in given]
-    return {**asdict(bar), "more": more}
+    slots = [{name: getattr(slot, name) for name in _SLOT} for slot in bar.slots]
+    return {**{name: getattr(bar, name) for name in _BAR}, "slots": slots, "more": more}
+
+
+_BAR, _SLOT = (tuple(field.name for field in fields(kind)) for kind in (Bar, Slot))

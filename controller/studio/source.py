@@ -7,6 +7,7 @@ A call is known by where it ends (see ``motions.language.tracing``).
 from __future__ import annotations
 
 import ast
+import functools
 import inspect
 import math
 import re
@@ -346,10 +347,11 @@ def first_parameters(name: str) -> list[str]:
     return [one.name for one in needed if one.kind is one.POSITIONAL_OR_KEYWORD]
 
 
-def parameters(name: str) -> list[str]:
+@functools.cache
+def parameters(name: str) -> tuple[str, ...]:
     """The parameters of a call of a timeline; none for another function."""
     method = getattr(Timeline, name, None)
-    return list(inspect.signature(method).parameters)[1:] if callable(method) else []
+    return tuple(inspect.signature(method).parameters)[1:] if callable(method) else ()
 
 
 def written(value: float | str, before: str = "") -> str:

@@ -25,18 +25,24 @@ if TYPE_CHECKING:
 
 
 def serve(pipe: Connection) -> None:
-    """Answer orders: a word once the robot is loaded, one when the file has run, and the answer."""
+    """Answer orders: a word once the robot is loaded, one when the file has run, and the answer.
+
+    A first order that is ``None`` has it play something before that word: then all of it is loaded.
+    """
     with suppress(EOFError, KeyboardInterrupt):
-        order: Order = pipe.recv()
+        order: Order | None = pipe.recv()
         from controller.studio.making import Maker
-        from motions import FeasibilityChecker
+        from motions import FeasibilityChecker, Timeline
         from motions.memory import Memory
 
         checker = FeasibilityChecker(memory=Memory())  # most of a motion is as it was
         maker = Maker()
+        if order is None:
+            _played(checker.evaluate(Timeline().body(z=-0.01, over=0.2)), checker)
         pipe.send("loaded")
         while True:
-            pipe.send(_answer(order, checker, maker, pipe))
+            if order is not None:
+                pipe.send(_answer(order, checker, maker, pipe))
             order = pipe.recv()
 
 
@@ -45,6 +51,7 @@ def _answer(
 ) -> Answer | StudioError:
     from controller.report_view import planned, slider
     from motions import suggest
+    from viz.replay.page_data import prepared
 
     has_run = False
     try:
@@ -73,7 +80,8 @@ def _answer(
     sliders = tuple(slider(item, values.get(item.name, item.default)) for item in motion.parameters)
     bars = tuple(_bars(Source(order.data), str(order.path), made.marks, content))
     content = replace(content, sliders=sliders)
-    return Answer(motion.name, content, bars, made.names, told, made.notes)
+    shown = content if order.task is Task.EXPORT else prepared(content)
+    return Answer(motion.name, shown, bars, made.names, told, made.notes)
 
 
 def _played(checked: CheckedMotion, checker: FeasibilityChecker) -> tuple[ReplayContent, str]:

@@ -42,7 +42,7 @@ from go2_wbc.robot.model import RobotModel
 from motions.batch_kinematics import attitudes
 from motions.feasibility.forces import Case
 from motions.feasibility.report import Series
-from motions.memory import Rows, by_rows
+from motions.memory import Memory, Rows, by_rows
 from motions.plan.trajectory import Trajectory
 
 STRIDE = 4
@@ -239,13 +239,22 @@ class LinkHulls:
         """Of the links."""
         return tuple(link.name for link in self.links)
 
-    def heights(self, motion: Trajectory) -> Float[np.ndarray, "n k"]:
-        """Of the lowest point of every link over the ground [m]; see ``LinkHull.heights``."""
-        up, height = attitudes(motion.rpy)[:, 2], motion.q[:, 2]
-        frames = {TRUNK_JOINT: (up, height)}
-        for leg in LEGS:
-            frames |= self._leg_frames(leg, up, height, motion.q[:, 7:][:, leg.joints])
-        return np.column_stack([link.heights(*frames[link.joint]) for link in self.links])
+    def heights(self, motion: Trajectory, memory: Memory | None = None) -> Float[np.ndarray, "n k"]:
+        """Of the lowest point of every link over the ground [m]; see ``LinkHull.heights``.
+
+        ``memory``: of motions that are like it.
+        """
+        vertical, places = attitudes(motion.rpy)[:, 2], motion.q[:, 2]
+
+        def work(rows: Rows) -> Float[np.ndarray, "m k"]:
+            up, height, joints = vertical[rows], places[rows], motion.q[rows, 7:]
+            frames = {TRUNK_JOINT: (up, height)}
+            for leg in LEGS:
+                frames |= self._leg_frames(leg, up, height, joints[:, leg.joints])
+            return np.column_stack([link.heights(*frames[link.joint]) for link in self.links])
+
+        given = np.hstack([vertical, places[:, None], motion.q[:, 7:]])
+        return by_rows(memory, "heights", given, work)
 
     def _leg_frames(
         self,

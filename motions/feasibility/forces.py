@@ -152,6 +152,7 @@ a slip moves nothing (own choice, 6 % of the weight)."""
 STILL = 1e-6  #: Joint speed [rad/s] below which a motor drives nothing: more than rounding, 1e-15
 NO_SUPPORT = 1.0
 """How far outside [m] of their support CoM and zero-moment point count when no foot stands."""
+FAR = 1e3  #: Where feet in the air count as being [m], of those that tell supports apart
 _FEW = (2, 3)
 TRUNK = ("trunk", "trunk turning")
 TIGHT_TORQUE, TIGHT_LOAD, TIGHT_FRICTION = 0.1, 10.0, 0.05
@@ -340,12 +341,20 @@ def support(case: Case) -> tuple[Series, Series]:
     three, while a foot is lifted shortly without a shift of the trunk, both may be as far outside.
     """
     motion, limits = case.path, case.limits
-    values = np.full((len(motion.times), 2), -NO_SUPPORT)
-    for rows in _same_support(motion):
-        stands = motion.stance[rows[0]]
-        feet = motion.p_feet[rows[0], stands, :2]
-        for column, points in enumerate((motion.p_com[:, :2], case.forces.zmp)):
-            values[rows, column] = support_margins(feet, points[rows])
+    places = np.where(motion.stance[:, :, None], motion.p_feet[:, :, :2], FAR).reshape(-1, 8)
+    both = np.hstack([motion.p_com[:, :2], case.forces.zmp])
+
+    def work(rows: Rows) -> Float[np.ndarray, "k 2"]:
+        found = np.full((len(rows), 2), -NO_SUPPORT)
+        for own in _same_support(places[rows]):
+            stands = motion.stance[rows[own[0]]]
+            feet, asked = motion.p_feet[rows[own[0]], stands, :2], both[rows[own]]
+            if stands.any():
+                margins = support_margins(feet, asked.reshape(-1, 2))
+                found[own] = margins.reshape(-1, 2)
+        return found
+
+    values = by_rows(case.memory, "support", np.hstack([places, both]), work)
     passes, pair = passes_over_few(motion, limits), motion.stance.sum(axis=1) == _FEW[0]
     written, tight = ~motion.is_dynamic, TIGHT_SUPPORT
     where, both = (written & ~(passes & pair))[:, None], written[:, None]
@@ -371,13 +380,11 @@ def passes_over_few(motion: Trajectory, limits: FeasibilityLimits) -> Bool[np.nd
     return few
 
 
-def _same_support(motion: Trajectory) -> list[Int[np.ndarray, " k"]]:
-    """Samples, one after the other, in which the same feet stand in the same places."""
-    places = np.where(motion.stance[:, :, None], motion.p_feet[:, :, :2], np.inf).reshape(-1, 8)
+def _same_support(places: Float[np.ndarray, "n 8"]) -> list[Int[np.ndarray, " k"]]:
+    """Samples, one after the other, in which the same feet stand in the same ``places``."""
     keys = np.round(places, 6)
     changes = np.flatnonzero((keys[1:] != keys[:-1]).any(axis=1)) + 1
-    groups = np.split(np.arange(len(keys)), changes)
-    return [rows for rows in groups if motion.stance[rows[0]].any()]
+    return np.split(np.arange(len(keys)), changes)
 
 
 def state_at(motion: Trajectory, row: int) -> RobotState:

@@ -125,7 +125,7 @@ def clearance(case: Case, hulls: LinkHulls) -> Series:
     motion, limits = case.path, case.limits
     feet = case.places[:, :, 2] - case.model.foot_radius
     sunk = np.where(motion.stance | motion.is_dynamic[:, None], 0.0, np.minimum(feet, 0.0))
-    links, count = hulls.heights(motion), len(hulls.links)
+    links, count = hulls.heights(motion, case.memory), len(hulls.links)
     lower = {"thigh": limits.thigh_clearance, "calf": limits.calf_clearance}
     parts = [name.rpartition(" ")[2] for name in hulls.names]
     least = [lower.get(part, limits.clearance) for part in parts]

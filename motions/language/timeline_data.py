@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields
 from itertools import pairwise
 from typing import Self, TypeVar
 
@@ -242,13 +242,24 @@ class TimelineData:
         return self._longer([BalanceShift(self.cursor, end, Ease.MINIMUM_JERK, raised)], end)
 
     def _longer(self, keys: Sequence[Key], cursor: float) -> Self:
-        return replace(
-            self,
+        first = min((key.start for key in keys), default=self.cursor)
+        longer = self.unchecked(
             keys=(*self.keys, *keys),
             cursor=max(cursor, self.floor),
-            last_start=min((key.start for key in keys), default=self.cursor),
+            last_start=first,
             floor=0.0,
         )
+        longer._require_length(longer.end)
+        _require_no_overlap([*(key for key in self.keys if key.end >= first - SAME), *keys])
+        return longer
+
+    def unchecked(self, **values: object) -> Self:
+        """A copy with other ``values``, of which it is known that they are valid."""
+        other = object.__new__(type(self))
+        for name in _FIELDS:
+            value = values[name] if name in values else getattr(self, name)
+            object.__setattr__(other, name, value)
+        return other
 
     def _joined(self, other: TimelineData, start: float) -> Self:
         return self._longer([key.later(start) for key in other.keys], start + other.end)
@@ -259,6 +270,9 @@ class TimelineData:
 
     def _span(self, over: float) -> tuple[float, float]:
         return self.cursor, self.clock.after(self.cursor, positive("over", over))
+
+
+_FIELDS = tuple(item.name for item in fields(TimelineData))
 
 
 def distinct(*instants: float) -> tuple[float, ...]:

@@ -13,10 +13,10 @@ import sys
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from copy import copy
 from dataclasses import dataclass, field, replace
 from inspect import signature
 from itertools import islice
+from operator import is_
 from types import CodeType, FrameType
 from typing import Any, ClassVar
 
@@ -94,7 +94,7 @@ def traced() -> Iterator[None]:
             outer = outer.f_back
 
     def tracing(name: str, method: Callable[..., Any]) -> Callable[..., Timeline]:
-        names = signature(method)
+        names = _signature(method)
 
         @functools.wraps(method)
         def call(*args: Any, **kwargs: Any) -> Timeline:  # noqa: ANN401 - as the method says
@@ -112,9 +112,7 @@ def traced() -> Iterator[None]:
             place = (frame.f_code.co_filename, _end_of(frame.f_code, frame.f_lasti))
             done = Call(name, *place, runs[place], given, tuple(callers(frame)), before)
             runs[place] += 1
-            marked = copy(after)  # its keys are checked: marks exclude nothing
-            object.__setattr__(marked, "keys", (*after.keys, _mark(before, after, done)))
-            return marked
+            return after.unchecked(keys=(*after.keys, _mark(before, after, done)))
 
         return call
 
@@ -134,6 +132,9 @@ def traced() -> Iterator[None]:
 _OWN = frozenset(vars(Timeline))  #: What is defined there, not inherited
 
 
+_signature = functools.cache(signature)
+
+
 @functools.lru_cache(maxsize=256)
 def _ends(code: CodeType) -> tuple[tuple[int, int], ...]:
     return tuple((end or 0, column or 0) for _, end, _, column in code.co_positions())
@@ -145,12 +146,14 @@ def _end_of(code: CodeType, instruction: int) -> tuple[int, int]:
 
 def _mark(before: Timeline, after: Timeline, call: Call) -> CallMark:
     """What ``call`` has added; all there is if it has made another motion of it."""
-    known = {id(key) for key in before.keys}
-    new = [key for key in after.keys if id(key) not in known and not isinstance(key, CallMark)]
-    made = [key for key in after.keys if not isinstance(key, CallMark)]
-    is_whole = len(made) - len(new) < sum(not isinstance(key, CallMark) for key in before.keys)
+    count = len(before.keys)
+    is_longer = len(after.keys) >= count and all(map(is_, before.keys, after.keys))
+    tail = after.keys[count:] if is_longer else after.keys
+    known = set[int]() if is_longer else {id(key) for key in before.keys}
+    new = [key for key in tail if id(key) not in known and not isinstance(key, CallMark)]
+    is_whole = not is_longer and _count(after) - len(new) < _count(before)
     if is_whole or (call.name in _JOINING and new):
-        new, parts = made, {TIME}
+        new, parts = [key for key in after.keys if not isinstance(key, CallMark)], {TIME}
     else:
         parts = {part for key in new for part in _parts(key)} or {TRUNK if new else TIME}
     start = min([key.start for key in new], default=min(before.cursor, after.cursor))
@@ -158,6 +161,11 @@ def _mark(before: Timeline, after: Timeline, call: Call) -> CallMark:
     moves = [key.start for key in new if not isinstance(key, BalanceShift)]
     in_order = tuple(sorted(parts, key=str))
     return CallMark(start, end, Ease.LINEAR, call.name, min(moves, default=start), in_order, call)
+
+
+def _count(line: Timeline) -> int:
+    """Of its keys without the marks."""
+    return sum(not isinstance(key, CallMark) for key in line.keys)
 
 
 _JOINING = frozenset({"then", "together", "repeat", "loop"})

@@ -27,6 +27,9 @@ from motions.plan.compiled_plan import CompiledPlan, DynamicSpan, PlanSamples
 from motions.plan.tracks import sample_times
 from motions.postures import standing_feet
 
+LEAST_SHARE = 1e-6
+"""Share of its load below which a foot bears nothing: at the instant of a touchdown it is 0 but for
+rounding, and a foot more among which the load is shared changes the shares of the others."""
 CENTRING_STEPS = 5  #: Steps that put the CoM in its place; see ``place``
 
 
@@ -77,6 +80,7 @@ def trajectory_of(plan: MotionPlan, model: RobotModel, memory: Memory | None = N
         if rows.stop - rows.start > 1:
             v[rows], a[rows] = batch_kinematics.rates(times[rows], q[rows], rpy[rows])
     greatest = asked.normal_force_max
+    share = greatest / max(float(greatest.max()), 1e-9)
     path = Trajectory(
         times=times,
         q=q,
@@ -85,7 +89,7 @@ def trajectory_of(plan: MotionPlan, model: RobotModel, memory: Memory | None = N
         rpy=rpy,
         p_com=placed.p_com,
         stance=asked.stance,
-        load_share=greatest / max(float(greatest.max()), 1e-9),
+        load_share=np.where(share < LEAST_SHARE, 0.0, share),
         p_feet=asked.p_feet,
         miss=placed.miss,
         is_dynamic=is_dynamic,

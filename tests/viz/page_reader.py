@@ -39,6 +39,18 @@ def read_pack(content: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     return header, arrays
 
 
+def read_message(message: bytes, known: bytes = b"") -> tuple[dict[str, Any], bytes]:
+    """What a page is told, and the block that it makes of the one that it has."""
+    length = int.from_bytes(message[:4], "little")
+    told, sent = json.loads(message[4 : 4 + length]), message[4 + length :]
+    whole = b""
+    for start, first, count in told["copies"]:
+        gap, sent = sent[: start - len(whole)], sent[start - len(whole) :]
+        whole += gap + known[first : first + count]
+    assert len(whole + sent) == told["size"]
+    return told, whole + sent
+
+
 def transforms(header: dict[str, Any]) -> dict[str, np.ndarray]:
     """Fixed transform of each node that a recorded command sets, by path."""
     return {

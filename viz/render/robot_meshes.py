@@ -185,14 +185,15 @@ class PosedRobot:
         model, places = self._model, np.empty((len(q), 4, 3))
         base = Rotation.from_quat(q[:, 3:7]).as_matrix()
         for leg, frame in enumerate(self._foot_frames):
-            p, R, foot = q[:, :3], base, model.frames[frame]
-            for joint in model.supports[foot.parentJoint].tolist()[2:]:
-                T, angles = model.jointPlacements[joint], q[:, model.idx_qs[joint], None, None]
+            foot = model.frames[frame]
+            p = np.tile(foot.placement.translation, (len(q), 1))
+            for joint in model.supports[foot.parentJoint].tolist()[:1:-1]:
+                T, angles = model.jointPlacements[joint], q[:, model.idx_qs[joint], None]
                 # About a unit axis with the cross product K: 1 + sin K + (1 - cos) K^2 (Rodrigues).
                 K = pin.skew(np.ravel(model.joints[joint].createData().S)[3:])
-                p, R = p + R @ T.translation, R @ T.rotation
-                R = R + np.sin(angles) * (R @ K) + (1.0 - np.cos(angles)) * (R @ (K @ K))
-            places[:, leg] = p + R @ foot.placement.translation
+                p = p + np.sin(angles) * (p @ K.T) + (1.0 - np.cos(angles)) * (p @ (K @ K).T)
+                p = p @ T.rotation.T + T.translation
+            places[:, leg] = q[:, :3] + (base @ p[:, :, None])[:, :, 0]
         return places
 
     def on_trunk(self, points: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:

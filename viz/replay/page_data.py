@@ -10,15 +10,13 @@ being sent, and meshes in them are references that the page resolves against one
 
 from __future__ import annotations
 
-import base64
-import gzip
 import html
 import json
 import re
 import uuid
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from importlib import resources
 from pathlib import Path
 from types import SimpleNamespace
@@ -28,7 +26,7 @@ import meshcat
 import meshcat.geometry as shapes
 import numpy as np
 import pinocchio as pin
-from jaxtyping import Float, Shaped
+from jaxtyping import Float
 from meshcat.transformations import rotation_matrix, translation_matrix
 
 from go2_wbc.arguments import typed
@@ -41,61 +39,8 @@ from viz.render.camera import smoothed
 from viz.render.ground import COLORS, grid_of
 from viz.render.mesh import Surface
 from viz.render.robot_meshes import PosedRobot, RobotVisuals, visuals_of
+from viz.replay.packing import Pack, Packed, compressed_text
 from viz.style import FORCE, INK, LEG_COLORS
-
-_ALIGNMENT = 8  # [bytes] typed arrays in a browser must start at a multiple of their item size
-_QUANTISED_LEVELS = 65535  # of an unsigned 16-bit number
-
-
-@final
-class Pack:
-    """Collects arrays; ``packed`` gives them as one gzipped base64 text.
-
-    Layout, little-endian: length of the header (uint32), header (JSON, UTF-8), padding, arrays.
-    """
-
-    def __init__(self) -> None:
-        self._blobs: list[bytes] = []
-        self._entries: dict[str, dict[str, object]] = {}
-        self._size = 0
-
-    def add(
-        self, name: str, array: Shaped[np.ndarray, "..."], extra: Mapping[str, object] | None = None
-    ) -> None:
-        """Store an array of one of the types that a browser knows; ``extra`` is told with it."""
-        blob = np.ascontiguousarray(array).tobytes()
-        kind = f"{array.dtype.name.capitalize()}Array"  # float32 is a browser's Float32Array
-        entry = {"type": kind, "shape": array.shape, "offset": self._size}
-        self._entries[name] = {**entry, **(extra or {})}
-        blob += b"\0" * (-len(blob) % _ALIGNMENT)
-        self._blobs.append(blob)
-        self._size += len(blob)
-
-    def add_quantised(self, name: str, array: Shaped[np.ndarray, "n k"]) -> None:
-        """Store each column as 16-bit numbers between its own extremes."""
-        low = array.min(axis=0, initial=0.0)
-        span = np.maximum(array.max(axis=0, initial=0.0) - low, 1e-9)
-        levels = np.round((array - low) / span * _QUANTISED_LEVELS).astype(np.uint16)
-        scale = span / _QUANTISED_LEVELS
-        self.add(name, levels, {"low": low.tolist(), "scale": scale.tolist()})
-
-    def packed(self, header: dict[str, object], *, is_brief: bool = False) -> str:
-        """Everything, with ``header`` beside the table of the arrays; see ``compressed_text``."""
-        table = json.dumps({**header, "arrays": self._entries}, separators=(",", ":"))
-        head = table.encode()
-        start = 4 + len(head)
-        padding = b"\0" * (-start % _ALIGNMENT)
-        content = len(head).to_bytes(4, "little") + head + padding + b"".join(self._blobs)
-        return compressed_text(content, is_brief=is_brief)
-
-
-def compressed_text(content: bytes, *, is_brief: bool = False) -> str:
-    """Gzipped and base64; the same content always gives the same text.
-
-    What ``is_brief`` is read once on the same machine: it need not be small.
-    """
-    return base64.b64encode(gzip.compress(content, 1 if is_brief else 9, mtime=0)).decode("ascii")
-
 
 _NORMAL_LEVELS = 127  # of a signed 8-bit number
 _SHAFT_RADIUS, _HEAD_RADIUS, _HEAD_LENGTH = 0.007, 0.018, 0.035  # [m] force arrow
@@ -261,22 +206,33 @@ def scene_text(recording: Recording) -> str:
     pack, visuals = Pack(), visuals_of(recording)
     scene = robot_scene(visuals, pack)
     legs = {"legs": [leg.name for leg in LEGS], "leg_colors": LEG_COLORS}
-    return pack.packed({**scene, **legs, "foot_radius": visuals.foot_radius})
+    header = {**scene, **legs, "foot_radius": visuals.foot_radius}
+    return compressed_text(pack.packed(header).data)
 
 
-def content_text(
-    content: ReplayContent, title: str, version: str = "", *, is_brief: bool = False
-) -> str:
-    """What happens, packed.
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """What happens, as a page needs it: a fraction of it."""
 
-    ``version`` tells one text of a live page from the next; see ``compressed_text``.
-    """
-    pack = Pack()
+    pack: Pack
+    header: Mapping[str, object]
+    is_feasible: bool
+    editor: Mapping[str, object] | None  #: see ``ReplayContent``
+
+    def packed(self, title: str, version: str = "") -> Packed:
+        """All of it; ``version`` tells one block of a live page from the next."""
+        own = {"title": title, "version": version, "editor": self.editor}
+        return self.pack.packed({**self.header, **own})
+
+
+def prepared(content: ReplayContent | Prepared) -> Prepared:
+    """What a page needs of ``content``."""
+    if isinstance(content, Prepared):
+        return content
+    pack, verdict = Pack(), content.verdict
     rate, frames = replay_frames(content.recording)
     highest = float(np.percentile(frames["forces"], _FORCE_PERCENTILE))
     header: dict[str, object] = {
-        "title": title,
-        "version": version,
         "is_plan": content.is_plan,
         **_add_frames(pack, "", rate, frames),
         "labels": [[s.start, s.end, s.label] for s in content.recording.spans()],
@@ -286,7 +242,6 @@ def content_text(
         "end_pose": content.end_pose,
         "has_sound": bool(content.sound),
         "sliders": [asdict(slider) for slider in content.sliders],
-        "editor": content.editor,
         "verdict": None,
         "ghost": None,
         "ground": None,
@@ -303,12 +258,12 @@ def content_text(
         header["ground"] = {**place, "low": float(np.nanmin(grid.z)), "colors": COLORS}
     if content.sound:
         pack.add("sound", np.frombuffer(content.sound, np.uint8))
-    if content.verdict is not None:
-        header["verdict"] = _add_verdict(pack, content.verdict)
+    if verdict is not None:
+        header["verdict"] = _add_verdict(pack, verdict)
     for name, other in (("ghost", content.ghost), ("written", content.written)):
         if other is not None:
             header[name] = _add_frames(pack, f"{name}.", *replay_frames(other))
-    return pack.packed(header, is_brief=is_brief)
+    return Prepared(pack, header, verdict is None or verdict.ok, content.editor)
 
 
 def replay_frames(recording: Recording) -> tuple[float, dict[str, np.ndarray]]:
@@ -440,7 +395,8 @@ def export_html(shown: Recording | ReplayContent, path: Path, *, title: str) -> 
 def replay_html(shown: Recording | ReplayContent, *, title: str) -> str:
     """The page of ``export_html`` as text; raises as it does, but for the path."""
     content = checked_content(shown)
-    page = page_text(title, scene_text(content.recording), content_text(content, title))
+    data = compressed_text(prepared(content).packed(title).data)
+    page = page_text(title, scene_text(content.recording), data)
     if (size := len(page.encode())) > PAGE_LIMIT:
         raise ConfigError(
             f"the page would have {size} bytes, limit {PAGE_LIMIT}; record a shorter run"

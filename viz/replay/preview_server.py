@@ -22,7 +22,8 @@ from urllib.parse import parse_qs, urlsplit
 
 from go2_wbc.errors import ConfigError
 from viz.content import ReplayContent, checked_content
-from viz.replay.page_data import content_text, page_text, scene_text
+from viz.replay.packing import Packed, compressed_text, message
+from viz.replay.page_data import Prepared, page_text, prepared, scene_text
 
 _log = logging.getLogger(__name__)
 
@@ -30,10 +31,12 @@ LOOPBACK = "127.0.0.1"
 LOOPBACK_NAMES = (LOOPBACK, "localhost", "[::1]")
 _HEARTBEAT = 10.0
 """A page that hears nothing for so long [s] gets an empty line, which finds closed pages."""
+_KEPT = 3  #: Versions that a page may have got last, of which it then gets the changes only
 _MOST_SENT = 65_536  #: Longest text [bytes] that a page may send
 TOKEN_HEADER = "X-Studio-Token"
 Values = dict[str, float | str]  #: What was chosen for parameters, by their names
-Action = Callable[[Mapping[str, object]], Mapping[str, object]]  #: Answers JSON with JSON
+Action = Callable[[Mapping[str, object]], Mapping[str, object] | bytes]
+"""Answers JSON with JSON, or with what ``PreviewServer.answer`` gives."""
 _HEADERS = {
     "Cache-Control": "no-store",
     "Content-Security-Policy": "default-src 'self' 'unsafe-inline' data: blob:",
@@ -52,7 +55,6 @@ class PreviewServer(ThreadingHTTPServer):
 
     Attributes:
         url: address of the page.
-        data: what the page shows now, packed.
         on_values: who is told what was chosen.
     """
 
@@ -90,6 +92,7 @@ class PreviewServer(ThreadingHTTPServer):
         self.token, self.actions = token, actions or {}
         self._scene = scene_text(content.recording)
         self._changed = threading.Condition()
+        self._sent = dict[str, Packed]()
         self._is_open = True
         self._pack(content)
         try:
@@ -105,7 +108,29 @@ class PreviewServer(ThreadingHTTPServer):
         self._thread = threading.Thread(target=self.serve_forever, args=(0.05,), daemon=True)
         self._thread.start()
 
-    def publish(self, content: ReplayContent, title: str = "") -> None:
+    @property
+    def data(self) -> str:
+        """What the page shows now, packed."""
+        return compressed_text(self._shown.data)
+
+    def changes(self, has: object) -> bytes:
+        """What the page shows now, without what a page has that shows the version ``has``."""
+        with self._changed:
+            return message({}, self._shown, self._sent.get(str(has)))
+
+    def answer(
+        self,
+        told: Mapping[str, object],
+        content: ReplayContent | Prepared,
+        title: str,
+        has: object,
+    ) -> bytes:
+        """Something else for the page that asks, with what it is ``told``; see ``changes``."""
+        with self._changed:
+            old = self._sent.get(str(has))
+            return message(told, self._packed(prepared(content), title, uuid.uuid4().hex), old)
+
+    def publish(self, content: ReplayContent | Prepared, title: str = "") -> None:
         """Show this from now on, under another title if there is one, and no error.
 
         Raises:
@@ -166,11 +191,19 @@ class PreviewServer(ThreadingHTTPServer):
         """Log what went wrong in an answer; the page may have been closed meanwhile."""
         _log.info("no answer to %s", client_address, exc_info=True)
 
-    def _pack(self, content: ReplayContent) -> None:
-        version = uuid.uuid4().hex
-        self.data = content_text(checked_content(content), self._title, version)
-        self._version, self._error, self._broken_since = version, None, ""
-        self._is_feasible = content.verdict is None or content.verdict.ok
+    def _pack(self, content: ReplayContent | Prepared) -> None:
+        if isinstance(content, ReplayContent):
+            content = prepared(checked_content(content))
+        self._version, self._error, self._broken_since = uuid.uuid4().hex, None, ""
+        self._shown = self._packed(content, self._title, self._version)
+        self._is_feasible = content.is_feasible
+
+    def _packed(self, content: Prepared, title: str, version: str) -> Packed:
+        """It under a version of its own, by which it is known until ``_KEPT`` others are."""
+        self._sent[version] = content.packed(title, version)
+        for old in [*self._sent][:-_KEPT]:
+            del self._sent[old]
+        return self._sent[version]
 
 
 @final
@@ -181,13 +214,13 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Answer one request."""
-        path = urlsplit(self.path).path
+        path, query = urlsplit(self.path).path, parse_qs(urlsplit(self.path).query)
         if not self._is_allowed():
             pass
         elif path == "/":
             self._answer(self.server.page(), "text/html")
         elif path == "/data":
-            self._answer(self.server.data, "text/plain")
+            self._answer_bytes(self.server.changes(query.get("has", [""])[0]))
         elif path == "/events":
             self._stream()
         else:
@@ -201,8 +234,11 @@ class _Handler(BaseHTTPRequestHandler):
             pass
         elif path in self.server.actions:
             if isinstance(order := self._sent(), dict):
-                answer = json.dumps(self.server.actions[path](order))
-                self._answer(answer, "application/json")
+                answer = self.server.actions[path](order)
+                if isinstance(answer, bytes):
+                    self._answer_bytes(answer)
+                else:
+                    self._answer(json.dumps(answer), "application/json")
             else:
                 self._refuse("needs an object, as JSON", HTTPStatus.BAD_REQUEST)
         elif path != "/parameters" or on_values is None:
@@ -251,13 +287,20 @@ class _Handler(BaseHTTPRequestHandler):
         return values if is_one else None
 
     def _answer(self, text: str, kind: str, status: HTTPStatus = HTTPStatus.OK) -> None:
-        content = text.encode()
+        self._answer_bytes(text.encode(), f"{kind}; charset=utf-8", status)
+
+    def _answer_bytes(
+        self,
+        content: bytes,
+        kind: str = "application/octet-stream",
+        status: HTTPStatus = HTTPStatus.OK,
+    ) -> None:
         self._begin(status, kind, {"Content-Length": str(len(content))})
         self.wfile.write(content)
 
     def _stream(self) -> None:
         """Server-sent events until the page or the server ends."""
-        self._begin(HTTPStatus.OK, "text/event-stream", {})
+        self._begin(HTTPStatus.OK, "text/event-stream; charset=utf-8", {})
         seen: str | None = None
         try:
             while (state := self.server.next_state(seen)) is not None:
@@ -268,7 +311,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _begin(self, status: HTTPStatus, kind: str, more: Mapping[str, str]) -> None:
         self.send_response(status)
-        for name, value in {**_HEADERS, "Content-Type": f"{kind}; charset=utf-8", **more}.items():
+        for name, value in {**_HEADERS, "Content-Type": kind, **more}.items():
             self.send_header(name, value)
         self.end_headers()
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 import json
 import time
 import wave
@@ -17,7 +15,7 @@ import pytest
 from controller.studio import running
 from controller.studio.session import Studio
 from go2_wbc.errors import StudioError
-from tests.viz.page_reader import read_pack
+from tests.viz.page_reader import read_message, read_pack
 
 GREET = '''"""Greets."""
 
@@ -67,20 +65,36 @@ def _look(studio: Studio) -> bool:
     return studio.look() or studio.look()
 
 
-def _shown(packed: str) -> dict[str, Any]:
-    header, _ = read_pack(gzip.decompress(base64.b64decode(packed)))
+def _shown(data: bytes) -> dict[str, Any]:
+    header, _ = read_pack(data)
     return header
+
+
+def _data(studio: Studio, known: bytes = b"") -> bytes:
+    """What the page shows now that has shown ``known``."""
+    has = _shown(known)["version"] if known else ""
+    return read_message(studio._server.changes(has), known)[1]
 
 
 def _editor(studio: Studio) -> dict[str, Any]:
     """What the page shows now."""
-    return _shown(studio._server.data)["editor"]
+    return _shown(_data(studio))["editor"]
+
+
+def _told(studio: Studio, order: dict[str, object]) -> dict[str, Any]:
+    """What is told of an edit that shows no draft."""
+    answer = studio.edit(order)
+    assert not isinstance(answer, bytes)
+    return answer
 
 
 def _edit(studio: Studio, bar: int, **order: object) -> dict[str, Any]:
     editor = _editor(studio)
     site = {"site": editor["bars"][bar]["site"], "base": editor["base"], "commit": True}
-    return json.loads(json.dumps(studio.edit({**site, **order})))
+    answer = studio.edit({**site, **order})
+    if isinstance(answer, bytes):
+        return {"data": read_message(answer)[1]}
+    return json.loads(json.dumps(answer))
 
 
 def test_bars_are_the_calls_of_the_file(studio: Studio) -> None:
@@ -107,6 +121,29 @@ def test_a_draft_is_shown_and_not_saved(studio: Studio, file: Path) -> None:
     assert _editor(studio) == before
 
 
+def test_a_page_gets_what_has_changed_and_has_the_whole_to_the_byte(studio: Studio) -> None:
+    rng, shown, sent, whole = np.random.default_rng(0), _data(studio), 0, 0
+    values = {"pitch": (5.0, 30.0), "over": (0.4, 1.2), "z": (0.03, 0.12)}
+    for number in range(40):
+        editor = _editor(studio)
+        bar = editor["bars"][int(rng.integers(len(editor["bars"])))]
+        name = str(rng.choice([slot["name"] for slot in bar["slots"] if slot["name"] in values]))
+        order = {
+            "op": "set", "site": bar["site"], "name": name, "base": editor["base"],
+            "value": round(float(rng.uniform(*values[name])), 2), "commit": number % 4 == 3,
+        }  # fmt: skip
+        answer = studio.edit({**order, "has": _shown(shown)["version"]})
+        if not isinstance(answer, bytes):
+            assert answer.keys() == {"site"}
+            shown = _data(studio, shown)
+            assert shown == _data(studio)
+            continue
+        _, shown = read_message(answer, shown)
+        assert shown == studio._server._sent[_shown(shown)["version"]].data
+        sent, whole = sent + len(answer), whole + len(shown)
+    assert sent < 0.8 * whole
+
+
 def test_an_edit_is_saved_shown_and_undone(studio: Studio, file: Path) -> None:
     answer = _edit(studio, 0, op="set", name="over", value=0.9)
     assert answer == {"site": _editor(studio)["bars"][0]["site"]}
@@ -131,7 +168,7 @@ def test_a_page_that_shows_an_older_text_changes_nothing(studio: Studio, file: P
     theirs = GREET.replace("over=0.6)\n", "over=0.7)\n", 1)
     file.write_text(theirs, encoding="utf-8")
     order = {"op": "delete", "site": old["bars"][0]["site"], "base": old["base"], "commit": True}
-    assert "saved elsewhere" in str(studio.edit(order)["error"])
+    assert "saved elsewhere" in str(_told(studio, order)["error"])
     assert file.read_text(encoding="utf-8") == theirs
     assert _editor(studio)["bars"][1]["span"][2] == pytest.approx(1.3), "theirs is shown"
 
@@ -169,15 +206,18 @@ def test_a_motion_that_cannot_be_done_is_made_possible(studio: Studio, file: Pat
     assert _edit(studio, 0, op="change", which=7)["error"]
     assert "error" not in _edit(studio, 0, op="change", which=0)
     assert f"return line.home(over=0.6){call}\n" in file.read_text(encoding="utf-8")
-    assert _shown(studio._server.data)["verdict"]["ok"]
+    assert _shown(_data(studio))["verdict"]["ok"]
 
 
 def test_physics_plays_it_beside_the_plan(studio: Studio) -> None:
+    studio.warm()
     answer = studio.play({})
-    shown = _shown(str(answer["data"]))
+    assert isinstance(answer, bytes)
+    told, data = read_message(answer)
+    shown = _shown(data)
     assert not shown["is_plan"]
     assert shown["ghost"] is not None
-    assert str(answer["told"]).startswith("played in MuJoCo: done")
+    assert str(told["told"]).startswith("played in MuJoCo: done")
 
 
 def test_what_is_exported_lies_beside_the_file(studio: Studio, file: Path) -> None:
@@ -284,10 +324,11 @@ def test_a_bar_of_a_helper_is_edited_where_it_is_called(studio: Studio, file: Pa
     bars = [bar for bar in editor["bars"] if bar["name"] == "body"]
     assert [bar["slots"][0]["value"] for bar in bars] == [5.0, 4.0, 3.0]
     site, base = bars[2]["site"], editor["base"]
-    offered = studio.edit({"op": "offers", "site": site, "number": 2, "base": base})["offers"]
-    assert [offer["op"] for offer in offered] == ["parameter", "pace"]  # type: ignore[index, union-attr]
+    offers = {"op": "offers", "site": site, "number": 2, "base": base}
+    offered = _told(studio, offers)["offers"]
+    assert [offer["op"] for offer in offered] == ["parameter", "pace"]
     order = {"op": "set", "site": site, "number": 2, "name": "pitch", "value": 6.5, "base": base}
-    assert "error" not in studio.edit({**order, "commit": True})
+    assert "error" not in _told(studio, {**order, "commit": True})
     assert file.read_text(encoding="utf-8") == HELPERS.replace("4.0, 3.0", "4.0, 6.5")
 
 
@@ -298,7 +339,7 @@ def test_a_loop_is_written_out_and_the_whole_undone(studio: Studio, file: Path) 
     editor = _editor(studio)
     (bar, *_) = (bar for bar in editor["bars"] if bar["name"] == "foot")
     order = {"op": "unroll", "site": bar["site"], "number": 0, "base": editor["base"]}
-    assert "error" not in studio.edit({**order, "commit": True})
+    assert "error" not in _told(studio, {**order, "commit": True})
     line = '    line = line.foot("FR", z=0.08, over=0.5).down("FR", over=0.5)\n'
     assert 2 * line in file.read_text(encoding="utf-8")
     studio.edit({"op": "undo"})
@@ -312,7 +353,7 @@ def test_an_empty_motion_is_shown_and_begun(studio: Studio, file: Path) -> None:
     editor = _editor(studio)
     assert editor["bars"] == []
     order = {"op": "begin", "title": "Tilt the trunk", "base": editor["base"]}
-    assert "error" not in studio.edit({**order, "commit": True})
+    assert "error" not in _told(studio, {**order, "commit": True})
     assert [bar["name"] for bar in _editor(studio)["bars"]] == ["body"]
 
 
@@ -326,12 +367,12 @@ def test_modules_beside_the_file_are_read_anew_and_random_numbers_are_told(
     )
     file.write_text(text, encoding="utf-8")
     _look(studio)
-    before = _shown(studio._server.data)["verdict"]["chance"]
+    before = _shown(_data(studio))["verdict"]["chance"]
     assert _editor(studio)["notes"] == []
     helper.write_text("DEEP = -0.30\n", encoding="utf-8")
     file.write_text(f"{text}# again\n", encoding="utf-8")
     _look(studio)
-    assert _shown(studio._server.data)["verdict"]["chance"] < before
+    assert _shown(_data(studio))["verdict"]["chance"] < before
     text = f"import random\n{GREET}".replace("def greet(", "def other(").replace(
         "z=0.08", "z=random.uniform(0.05, 0.08)"
     )

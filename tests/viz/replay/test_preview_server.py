@@ -14,7 +14,7 @@ import pytest
 
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
-from tests.viz.page_reader import packed_parts, read_data, read_pack
+from tests.viz.page_reader import packed_parts, read_data, read_message, read_pack
 from tests.viz.verdicts import made_up_verdict
 from viz.content import ReplayContent
 from viz.replay.preview_server import TOKEN_HEADER, PreviewServer
@@ -47,9 +47,20 @@ def _ask(
     method, path = what.split()
     connection.request(method, path, body, headers or {})
     answer = connection.getresponse()
-    text = answer.read().decode()
+    text = answer.read().decode(errors="replace")  # data are no text
     connection.close()
     return answer.status, text
+
+
+def _data(server: PreviewServer, query: str = "", known: bytes = b"") -> bytes:
+    """What a page shows that has got the data, and has ``known`` before."""
+    connection = http.client.HTTPConnection("127.0.0.1", _port(server), timeout=30)
+    connection.request("GET", f"/data{query}")
+    answer = connection.getresponse()
+    assert answer.status == 200
+    _, data = read_message(answer.read(), known)
+    connection.close()
+    return data
 
 
 def _post(server: PreviewServer, path: str, body: bytes, **headers: str) -> int:
@@ -62,9 +73,11 @@ def test_it_answers_with_the_page_and_its_data(server: PreviewServer) -> None:
     assert status == 200
     assert "<title>A &lt;plan&gt;</title>" in page
     assert "EventSource" in page
-    status, data = _ask(server, "GET /data")
-    assert status == 200
-    assert data in page
+    data = _data(server)
+    assert data == packed_parts(page)["replay-data"]
+    version = read_pack(data)[0]["version"]
+    assert _data(server, f"?has={version}", data) == data
+    assert _data(server, "?has=other", b"something else") == data
     assert _ask(server, "GET /etc/passwd")[0] == 404
     assert _ask(server, "GET /../pyproject.toml")[0] == 404
 
@@ -182,8 +195,7 @@ def test_what_is_published_is_told_and_served(server: PreviewServer, recording: 
     server.publish_error("oops")
     fourth = json.loads(server.next_state(json.dumps(third)) or "")
     assert re.fullmatch(told.format(", which the robot cannot do"), fourth["title"])
-    block = f'<script type="text/plain" id="replay-data">{_ask(server, "GET /data")[1]}</script>'
-    header, _ = read_pack(packed_parts(block)["replay-data"])
+    header, _ = read_pack(_data(server))
     assert header["version"] == third["version"]
     assert header["verdict"]["ok"] is False
     page_header, arrays = read_data(_ask(server, "GET /")[1])

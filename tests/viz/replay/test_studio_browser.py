@@ -85,6 +85,24 @@ def test_a_number_is_typed_and_a_broken_limit_is_red(tab: Tab, file: Path) -> No
     tab.wait_for(SETTLED)
 
 
+def test_what_the_page_has_kept_and_got_is_what_the_server_shows(tab: Tab) -> None:
+    for value in (0.7, 0.8, 0.65):
+        tab.evaluate(f"studio.set(studio.editor.bars[0], 'over', {value}, false)")
+        tab.wait_for(SETTLED)
+    tab.evaluate("studio.set(studio.editor.bars[0], 'over', 0.75, true)")
+    tab.wait_for(SETTLED)
+    count = tab.evaluate(
+        """(async () => {
+          const answer = await fetch(`data${location.search}`); // all of it
+          const { data } = patched(await answer.arrayBuffer(), replay.data);
+          const [whole, own] = [data, replay.data].map(({ buffer }) => new Uint8Array(buffer));
+          const isSame = whole.length === own.length && whole.every((byte, k) => byte === own[k]);
+          return isSame ? own.length : 0;
+        })()"""
+    )
+    assert count > 10_000
+
+
 def test_keys_reach_every_bar(tab: Tab, file: Path) -> None:
     keys = tab.page.keyboard
     tab.page.locator("[data-bar='0']").focus()

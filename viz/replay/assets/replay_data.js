@@ -76,7 +76,7 @@ class ReplayData extends Run {
   constructor(buffer, scene) {
     const pack = new Pack(buffer);
     super(pack, "", pack.header);
-    this.scene = scene;
+    Object.assign(this, { buffer, scene });
     this.header = { ...scene.header, ...pack.header };
     this.ghost = pack.header.ghost ? new Run(pack, "ghost.", pack.header.ghost) : null;
     this.written = pack.header.written ? new Run(pack, "written.", pack.header.written) : null;

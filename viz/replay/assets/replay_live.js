@@ -3,6 +3,30 @@
 
 const REST = 120; // ms, a slider that has not moved for so long is sent
 
+// What a server tells of other data than `known`, which the page has: see packing.py.
+function patched(message, known) {
+  const length = new DataView(message).getUint32(0, true);
+  const told = JSON.parse(new TextDecoder().decode(new Uint8Array(message, 4, length)));
+  const [sent, whole] = [new Uint8Array(message, 4 + length), new Uint8Array(told.size)];
+  let taken = 0;
+  let done = 0;
+  for (const [start, from, count] of [...told.copies, [told.size, 0, 0]]) {
+    whole.set(sent.subarray(taken, taken + start - done), done);
+    taken += start - done;
+    if (count) whole.set(new Uint8Array(known.buffer, from, count), start);
+    done = start + count;
+  }
+  return { ...told, data: new ReplayData(whole.buffer, known.scene) };
+}
+
+// What the server of a live page shows now.
+async function fetched(known) {
+  const query = new URLSearchParams(location.search);
+  query.set("has", known.header.version);
+  const answer = await fetch(`data?${query}`);
+  return patched(await answer.arrayBuffer(), known).data;
+}
+
 // The motion's parameters: what is chosen is sent to the server, which makes the motion anew.
 class Sliders {
   constructor() {
@@ -81,8 +105,7 @@ function listen(player) {
   events.onmessage = async ({ data }) => {
     const state = JSON.parse(data);
     if (state.version !== version) {
-      const answer = await fetch(`data${location.search}`);
-      player.use(new ReplayData(await unpack(await answer.text()), player.data.scene));
+      if (state.version !== player.data.header.version) player.use(await fetched(player.data));
       version = player.data.header.version;
       sliders.use(player.data.header);
       studio?.use(player.data.header.editor);

@@ -318,7 +318,7 @@ class Studio {
     const asked = performance.now();
     const answer = await this.post("edit", { ...order, base: this.editor.base, commit: isCommitted });
     if (answer.data) {
-      this.player.use(new ReplayData(await unpack(answer.data), this.player.data.scene));
+      this.player.use(answer.data);
       this.redrawDraft(this.player.data.header.editor);
       this.took = performance.now() - asked; // ms, for scripts that measure
     }
@@ -338,8 +338,11 @@ class Studio {
   async post(path, order) {
     try {
       const headers = { "Content-Type": "application/json" };
-      const answer = await fetch(`${path}${location.search}`, { method: "POST", headers, body: JSON.stringify(order) });
-      return await answer.json();
+      const known = this.player.data;
+      const body = JSON.stringify({ ...order, has: known.header.version });
+      const answer = await fetch(`${path}${location.search}`, { method: "POST", headers, body });
+      if (answer.headers.get("Content-Type") === "application/json; charset=utf-8") return await answer.json();
+      return patched(await answer.arrayBuffer(), known);
     } catch {
       return { error: "The studio has ended: nothing was saved." };
     }
@@ -347,13 +350,13 @@ class Studio {
 
   // What the server shows now: after a save, or instead of a draft that was refused.
   async reload(site) {
-    let answer;
+    let data;
     try {
-      answer = await fetch(`data${location.search}`);
+      data = await fetched(this.player.data);
     } catch {
       return;
     }
-    this.player.use(new ReplayData(await unpack(await answer.text()), this.player.data.scene));
+    this.player.use(data);
     this.use(this.player.data.header.editor, site);
   }
 
@@ -371,7 +374,7 @@ class Studio {
   async play() {
     const answer = await this.ask("play", "playing in MuJoCo…");
     if (!answer.data) return;
-    this.player.use(new ReplayData(await unpack(answer.data), this.player.data.scene));
+    this.player.use(answer.data);
     this.tell("");
     document.getElementById("who").prepend(element("b", {
       textContent: `${answer.told}. `, className: answer.told.startsWith("NOT") ? "bad" : "",

@@ -1,0 +1,125 @@
+"""Arrays with a header as one block of bytes, and of a block only what another one has not.
+
+Layout, little-endian: length of the header (uint32), header (JSON, UTF-8), padding, arrays. A
+message of changes is laid out likewise: its header says what is taken from the other block, the
+bytes that follow fill the gaps between.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from jaxtyping import Shaped
+
+_ALIGNMENT = 8  # [bytes] typed arrays in a browser must start at a multiple of their item size
+_QUANTISED_LEVELS = 65535  # of an unsigned 16-bit number
+_LENGTH = 4  # [bytes] of the header's length
+_LEAST_SAME = 64  # bytes; less is not worth a line of the table
+
+
+@dataclass(frozen=True, slots=True)
+class Packed:
+    """A block."""
+
+    data: bytes  #: all of it
+    places: Mapping[str, tuple[int, int]]  #: start and end [bytes] of header and arrays, by name
+
+
+@final
+class Pack:
+    """Collects arrays; one that is equal to another is kept once."""
+
+    def __init__(self) -> None:
+        self._blobs: list[bytes] = []
+        self._entries: dict[str, dict[str, object]] = {}
+        self._places: dict[str, tuple[int, int]] = {}
+        self._known: dict[bytes, int] = {}
+        self._size = 0
+
+    def add(
+        self, name: str, array: Shaped[np.ndarray, "..."], extra: Mapping[str, object] | None = None
+    ) -> None:
+        """Store an array of one of the types that a browser knows; ``extra`` is told with it."""
+        blob = np.ascontiguousarray(array).tobytes()
+        kind = f"{array.dtype.name.capitalize()}Array"  # float32 is a browser's Float32Array
+        start = self._known.setdefault(blob, self._size)
+        entry = {"type": kind, "shape": array.shape, "offset": start}
+        self._entries[name] = {**entry, **(extra or {})}
+        if start == self._size:
+            self._places[name] = start, start + len(blob)
+            blob += b"\0" * (-len(blob) % _ALIGNMENT)
+            self._blobs.append(blob)
+            self._size += len(blob)
+
+    def add_quantised(self, name: str, array: Shaped[np.ndarray, "n k"]) -> None:
+        """Store each column as 16-bit numbers between its own extremes."""
+        low = array.min(axis=0, initial=0.0)
+        span = np.maximum(array.max(axis=0, initial=0.0) - low, 1e-9)
+        levels = np.round((array - low) / span * _QUANTISED_LEVELS).astype(np.uint16)
+        scale = span / _QUANTISED_LEVELS
+        self.add(name, levels, {"low": low.tolist(), "scale": scale.tolist()})
+
+    def packed(self, header: Mapping[str, object]) -> Packed:
+        """Everything, with ``header`` beside the table of the arrays."""
+        head = _json({**header, "arrays": self._entries})
+        start = _LENGTH + len(head)
+        padding = b"\0" * (-start % _ALIGNMENT)
+        first = start + len(padding)
+        places = {name: (first + a, first + b) for name, (a, b) in self._places.items()}
+        parts = (_length(head), head, padding, *self._blobs)
+        return Packed(b"".join(parts), {"": (0, start), **places})
+
+
+def compressed_text(content: bytes) -> str:
+    """Gzipped and base64; the same content always gives the same text."""
+    return base64.b64encode(gzip.compress(content, mtime=0)).decode("ascii")
+
+
+def message(told: Mapping[str, object], new: Packed, old: Packed | None = None) -> bytes:
+    """What a page needs to make ``new`` of ``old``, and what it is ``told`` besides.
+
+    The header has ``size``, of the whole, and ``copies``: where in it, from where in ``old``, and
+    how many bytes.
+    """
+    copies = [] if old is None else _copies(new, old)
+    head = _json({**told, "size": len(new.data), "copies": copies})
+    gaps, done = list[bytes](), 0
+    for start, _, count in copies:
+        gaps.append(new.data[done:start])
+        done = start + count
+    return b"".join([_length(head), head, *gaps, new.data[done:]])
+
+
+def _copies(new: Packed, old: Packed) -> list[tuple[int, int, int]]:
+    """What begins or ends as it was, of every array: an edit leaves what is before and after it."""
+    copies = list[tuple[int, int, int]]()
+    for name, (start, end) in new.places.items():
+        first, last = old.places.get(name, (0, 0))
+        count = min(end - start, last - first)
+        ahead = _same(new.data[start : start + count], old.data[first : first + count])
+        back = (new.data[end - count : end], old.data[last - count : last])
+        behind = min(_same(*(one[::-1] for one in back)), count - ahead)
+        copies += [(start, first, ahead)] * (ahead >= _LEAST_SAME)
+        copies += [(end - behind, last - behind, behind)] * (behind >= _LEAST_SAME)
+    return copies
+
+
+def _same(one: bytes, other: bytes) -> int:
+    """How many bytes at the beginning are equal."""
+    if one == other:
+        return len(one)
+    return int(np.argmax(np.frombuffer(one, np.uint8) != np.frombuffer(other, np.uint8)))
+
+
+def _json(head: Mapping[str, object]) -> bytes:
+    return json.dumps(head, separators=(",", ":")).encode()
+
+
+def _length(head: bytes) -> bytes:
+    return len(head).to_bytes(_LENGTH, "little")
