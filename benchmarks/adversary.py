@@ -48,19 +48,12 @@ ROWS = (
 
 @dataclass(slots=True)
 class Attempt:
-    """A motion that was passed, and what came of it.
+    """A motion that was passed, and what came of it."""
 
-    Attributes:
-        numbers: that it was written by.
-        chance: that was stated.
-        harm: what went wrong, in words; empty if it was done.
-        worst: the greatest share of what is allowed.
-    """
-
-    numbers: Float[np.ndarray, " k"]
-    chance: float
-    harm: tuple[str, ...] = ()
-    worst: float = 0.0
+    numbers: Float[np.ndarray, " k"]  #: that it was written by
+    chance: float  #: that was stated
+    harm: tuple[str, ...] = ()  #: what went wrong, in words; empty if it was done
+    worst: float = 0.0  #: the greatest share of what is allowed
 
     @property
     def score(self) -> float:

@@ -48,19 +48,12 @@ DOWN = (Mode.FALLEN, Mode.DAMPED)
 
 @dataclass(frozen=True, slots=True)
 class Fall:
-    """One fall.
+    """One fall."""
 
-    Attributes:
-        time: of the fall in truth, or of the mode that said so before [s].
-        delay: from the fall to the mode that says so [s]; infinite if none did.
-        mode: what the robot was said to do.
-        call: what it was asked to do.
-    """
-
-    time: float
-    delay: float
-    mode: Mode
-    call: str
+    time: float  #: of the fall in truth, or of the mode that said so before [s]
+    delay: float  #: from the fall to the mode that says so [s]; infinite if none did
+    mode: Mode  #: what the robot was said to do
+    call: str  #: what it was asked to do
 
     def __str__(self) -> str:
         """In one line, for the notes."""

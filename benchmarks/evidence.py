@@ -40,21 +40,14 @@ Row = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line of a table.
-
-    Attributes:
-        metrics: whose values it shows, one or two; empty where one of two states has none.
-        what: in words.
-        shown: how a value is printed.
-        peer: a value to compare it with.
-        bar: of a line of two metrics, what is asked for.
-    """
+    """A line of a table."""
 
     metrics: tuple[str, ...]
-    what: str
-    shown: str
-    peer: str = ""
-    bar: str = ""
+    """Whose values it shows, one or two; empty where one of two states has none."""
+    what: str  #: in words
+    shown: str  #: how a value is printed
+    peer: str = ""  #: a value to compare it with
+    bar: str = ""  #: of a line of two metrics, what is asked for
 
     def text(self, rows: Mapping[str, Row]) -> str:
         """The line, from the results by metric.

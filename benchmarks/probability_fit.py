@@ -130,21 +130,14 @@ def _loss(
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """How well chances foretell outcomes.
+    """How well chances foretell outcomes."""
 
-    Attributes:
-        error: expected calibration error in 10 bins of equal width (Naeini et al., AAAI 2015).
-        error_interval: of 95 %, by resampling motions (bootstrap).
-        brier: mean squared difference of chance and outcome (Brier, 1950).
-        brier_of_base_rate: the same of one who always says the share of motions done.
-        bins: of each bin that holds any: mean chance, share done, runs.
-    """
-
-    error: float
-    error_interval: tuple[float, float]
-    brier: float
-    brier_of_base_rate: float
+    error: float  #: expected calibration error in 10 bins of equal width (Naeini et al., AAAI 2015)
+    error_interval: tuple[float, float]  #: of 95 %, by resampling motions (bootstrap)
+    brier: float  #: mean squared difference of chance and outcome (Brier, 1950)
+    brier_of_base_rate: float  #: the same of one who always says the share of motions done
     bins: tuple[tuple[float, float, int], ...]
+    """Of each bin that holds any: mean chance, share done, runs."""
 
 
 def calibration(

@@ -89,23 +89,17 @@ FREE = ("recover", "wait", "damp", "stop")
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """What the controller is not told.
+    """What the controller is not told."""
 
-    Attributes:
-        name: of the study.
-        item: what it is, for the report.
-        room: share by which True may be worse, and False must be better, than the limit that the
-            documentation names.
-        settings: of ``MujocoPlant``; on every other seed the ``others``, if there are any.
-        gaits: that are drawn.
-    """
-
-    name: str
-    item: str
+    name: str  #: of the study
+    item: str  #: what it is, for the report
     room: float
+    """Share by which True may be worse, and False must be better, than the limit that the
+    documentation names."""
     settings: Mapping[str, Any]
+    """Of ``MujocoPlant``; on every other seed the ``others``, if there are any."""
     others: Mapping[str, Any] = field(default_factory=dict)
-    gaits: tuple[str, ...] = (*GAITS, "trot", "trot", "auto")
+    gaits: tuple[str, ...] = (*GAITS, "trot", "trot", "auto")  #: that are drawn
 
     def plant(self, seed: int) -> MujocoPlant:
         """The simulated robot of a trial."""
@@ -137,25 +131,15 @@ WORLDS = (
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """One call, what follows it, and what a second thread calls meanwhile.
+    """One call, what follows it, and what a second thread calls meanwhile."""
 
-    Attributes:
-        name: of the method.
-        arguments: of it.
-        is_wrong: whether they are.
-        is_watched: whether the robot is watched for ``WATCHED`` seconds after it.
-        other: what a second thread calls, or "".
-        moment: time [s] after the beginning at which it does.
-        pause: time [s] until the next call.
-    """
-
-    name: str
-    arguments: tuple[Any, ...]
-    is_wrong: bool
-    is_watched: bool
-    other: str
-    moment: float
-    pause: float
+    name: str  #: of the method
+    arguments: tuple[Any, ...]  #: of it
+    is_wrong: bool  #: whether they are
+    is_watched: bool  #: whether the robot is watched for ``WATCHED`` seconds after it
+    other: str  #: what a second thread calls, or ""
+    moment: float  #: time [s] after the beginning at which it does
+    pause: float  #: time [s] until the next call
 
     def __str__(self) -> str:
         """As it is written."""

@@ -34,15 +34,11 @@ def settings_header() -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """The finished trials of studies.
-
-    Attributes:
-        finished: trials of the run that is resumed, by study and seed.
-        files: by study.
-    """
+    """The finished trials of studies."""
 
     finished: dict[tuple[str, int], TrialResult]
-    files: dict[str, SweepFile]
+    """Trials of the run that is resumed, by study and seed."""
+    files: dict[str, SweepFile]  #: by study
 
     def add(self, study: Study, seed: int, result: TrialResult) -> None:
         """Keep a trial: whoever kills the process leaves all of it or nothing."""

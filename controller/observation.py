@@ -31,21 +31,13 @@ STANCE_HEIGHT = 0.32  #: of the base [m] in that stance, on soles that just touc
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """Numbers that belong together.
+    """Numbers that belong together."""
 
-    Attributes:
-        name: of all of them.
-        parts: name of each, in order.
-        units: of each; "1" for a share or a direction.
-        limit: magnitude from which on each is cut.
-        about: what it is, in a line.
-    """
-
-    name: str
-    parts: tuple[str, ...]
-    units: tuple[str, ...]
-    limit: float
-    about: str
+    name: str  #: of all of them
+    parts: tuple[str, ...]  #: name of each, in order
+    units: tuple[str, ...]  #: of each; "1" for a share or a direction
+    limit: float  #: magnitude from which on each is cut
+    about: str  #: what it is, in a line
 
     @property
     def size(self) -> int:

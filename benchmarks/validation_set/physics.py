@@ -43,20 +43,14 @@ LENIENT_OFF = 0.05
 
 @dataclass(frozen=True, slots=True)
 class MotionFailures:
-    """What went wrong, in words, by each definition; nothing did where it is empty.
+    """What went wrong, in words, by each definition; nothing did where it is empty."""
 
-    Attributes:
-        strict: what an author sees: not done, or not as it was written.
-        stops: the same, or a joint was pressed against its stop: MuJoCo's hold a joint within
-            0.02 rad of its limit, so a motion that asks for more often looks done.
-        lenient: distances from the plan, with more room, whatever ``play`` says.
-        fell: nothing else.
-    """
-
-    strict: tuple[str, ...]
+    strict: tuple[str, ...]  #: what an author sees: not done, or not as it was written
     stops: tuple[str, ...]
-    lenient: tuple[str, ...]
-    fell: tuple[str, ...]
+    """The same, or a joint was pressed against its stop: MuJoCo's hold a joint within 0.02 rad of
+    its limit, so a motion that asks for more often looks done."""
+    lenient: tuple[str, ...]  #: distances from the plan, with more room, whatever ``play`` says
+    fell: tuple[str, ...]  #: nothing else
 
     def by(self, definition: str) -> tuple[str, ...]:
         """What went wrong by ``STRICT``, ``STOPS``, ``LENIENT`` or ``FELL``."""

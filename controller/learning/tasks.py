@@ -54,17 +54,11 @@ class Commands:
 
 @dataclass(frozen=True, slots=True)
 class Shoves:
-    """Pushes on the trunk, from any side, on the level.
+    """Pushes on the trunk, from any side, on the level."""
 
-    Attributes:
-        every: time [s] from one to the next.
-        impulse: of each [N s].
-        duration: of each [s].
-    """
-
-    every: Range = (2.0, 5.0)
-    impulse: Range = (3.0, 15.0)
-    duration: float = PUSH_TIME
+    every: Range = (2.0, 5.0)  #: time [s] from one to the next
+    impulse: Range = (3.0, 15.0)  #: of each [N s]
+    duration: float = PUSH_TIME  #: of each [s]
 
     def draw(self, rng: np.random.Generator) -> Array3:
         """The force of one [N]."""

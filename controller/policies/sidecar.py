@@ -51,19 +51,13 @@ MOST_HISTORY = 100
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """A part of the observation.
+    """A part of the observation."""
 
-    Attributes:
-        name: a key of ``SIZES``.
-        scale: of each of its numbers.
-        frequency: of a clock [Hz].
-        offsets: of a clock: for each one sine and cosine of its phase plus it.
-    """
-
-    name: str
-    scale: Float[np.ndarray, " n"]
-    frequency: float = 0.0
+    name: str  #: a key of ``SIZES``
+    scale: Float[np.ndarray, " n"]  #: of each of its numbers
+    frequency: float = 0.0  #: of a clock [Hz]
     offsets: tuple[float, ...] = ()
+    """Of a clock: for each one sine and cosine of its phase plus it."""
 
     __repr__ = brief
 

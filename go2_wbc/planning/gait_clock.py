@@ -60,23 +60,14 @@ class GaitForm:
 
 @dataclass(frozen=True, slots=True)
 class Cadence:
-    """Which gait is wanted.
+    """Which gait is wanted."""
 
-    Attributes:
-        wanted: its form, where it does not follow the speed.
-        rest: the one in which the robot starts and comes to rest.
-        stride: how period and duty follow the speed.
-        rough_stride: the same on rough ground.
-        seen_stride: the same on uneven ground that is seen.
-        follows_speed: whether they do.
-    """
-
-    wanted: GaitForm
-    rest: GaitForm
-    stride: Stride
-    rough_stride: Stride
-    seen_stride: Stride
-    follows_speed: bool
+    wanted: GaitForm  #: its form, where it does not follow the speed
+    rest: GaitForm  #: the one in which the robot starts and comes to rest
+    stride: Stride  #: how period and duty follow the speed
+    rough_stride: Stride  #: the same on rough ground
+    seen_stride: Stride  #: the same on uneven ground that is seen
+    follows_speed: bool  #: whether they do
 
     @staticmethod
     def of(gait: Gait, rough: RoughConfig | None = None) -> Cadence:

@@ -162,35 +162,20 @@ class RoughConfig:
 
 
 class Ground(Record):
-    """What is known of the ground.
+    """What is known of the ground."""
 
-    Attributes:
-        height: below the CoM [m].
-        slope: ahead and to the left, in the world's axes.
-        p_seen: where the CoM is [m].
-        p_met: where each foot met it last, by its centre [m].
-        roughness: distance [m] from the plane at which feet were met lately.
-        rough_way: for how far [m] it is taken for rough yet.
-        high_way: for how far [m] steps are taken for high yet.
-        steeper: share of the slope by which the trunk follows it more.
-        rise_way: for how far [m] steps up are expected yet.
-        ramp_way: for how far [m] a slope is taken for that of a ramp yet, not of stairs.
-        lift: height [m] by which the trunk is carried higher for these.
-        lean: slope that the trunk follows besides, to raise its leading end.
-    """
-
-    height: float
-    slope: Float[np.ndarray, "2"]
-    p_seen: Float[np.ndarray, "2"]
-    p_met: Float[np.ndarray, "4 3"]
-    roughness: float
-    rough_way: float
-    high_way: float
-    steeper: float
-    rise_way: float
-    ramp_way: float
-    lift: float
-    lean: Float[np.ndarray, "2"]
+    height: float  #: below the CoM [m]
+    slope: Float[np.ndarray, "2"]  #: ahead and to the left, in the world's axes
+    p_seen: Float[np.ndarray, "2"]  #: where the CoM is [m]
+    p_met: Float[np.ndarray, "4 3"]  #: where each foot met it last, by its centre [m]
+    roughness: float  #: distance [m] from the plane at which feet were met lately
+    rough_way: float  #: for how far [m] it is taken for rough yet
+    high_way: float  #: for how far [m] steps are taken for high yet
+    steeper: float  #: share of the slope by which the trunk follows it more
+    rise_way: float  #: for how far [m] steps up are expected yet
+    ramp_way: float  #: for how far [m] a slope is taken for that of a ramp yet, not of stairs
+    lift: float  #: height [m] by which the trunk is carried higher for these
+    lean: Float[np.ndarray, "2"]  #: slope that the trunk follows besides, to raise its leading end
 
 
 def ground_below(now: Snapshot, foot_radius: float) -> Ground:
@@ -423,20 +408,14 @@ def note_stumble(g: Ground) -> None:
 
 
 class Slip(Record):
-    """What the feet have shown.
+    """What the feet have shown."""
 
-    Attributes:
-        friction: the estimate.
-        loaded: time [s] for which each foot has stood.
-        sliding: time [s] for which it has slid.
-        has_slid: whether a foot has, and has shown less than the greatest estimate, since that
-            was the estimate.
-    """
-
-    friction: float
+    friction: float  #: the estimate
     has_slid: bool
-    loaded: Float[np.ndarray, "4"]
-    sliding: Float[np.ndarray, "4"]
+    """Whether a foot has, and has shown less than the greatest estimate, since that was the
+    estimate."""
+    loaded: Float[np.ndarray, "4"]  #: time [s] for which each foot has stood
+    sliding: Float[np.ndarray, "4"]  #: time [s] for which it has slid
 
 
 @subroutine

@@ -71,31 +71,18 @@ _TINY = 1e-9
 
 
 class Sight(Record):
-    """What a walk has seen.
+    """What a walk has seen."""
 
-    Attributes:
-        since: for how long [s] it has not looked.
-        sees: whether the ground below the trunk is known.
-        plane: height [m] below the CoM and slope of the ground.
-        most: greatest speed [m/s] that the way permits.
-        uneven_way: for how far [m] the ground is taken for uneven yet.
-        lift: height [m] by which the trunk is carried higher.
-        blocked: what ends the way ahead, 0 for nothing.
-        end: how far ahead [m] of the CoM that is.
-        stopped: for how long [s] it has been so near that the robot has stopped.
-        is_slowed: whether the robot is told less than it was asked for.
-    """
-
-    since: float
-    sees: bool
-    plane: Array3
-    most: float
-    uneven_way: float
-    lift: float
-    blocked: float
-    end: float
-    stopped: float
-    is_slowed: bool
+    since: float  #: for how long [s] it has not looked
+    sees: bool  #: whether the ground below the trunk is known
+    plane: Array3  #: height [m] below the CoM and slope of the ground
+    most: float  #: greatest speed [m/s] that the way permits
+    uneven_way: float  #: for how far [m] the ground is taken for uneven yet
+    lift: float  #: height [m] by which the trunk is carried higher
+    blocked: float  #: what ends the way ahead, 0 for nothing
+    end: float  #: how far ahead [m] of the CoM that is
+    stopped: float  #: for how long [s] it has been so near that the robot has stopped
+    is_slowed: bool  #: whether the robot is told less than it was asked for
 
     @property
     def why_blocked(self) -> str:

@@ -46,19 +46,13 @@ STEP = 0.015
 
 
 class FootContact(Record):
-    """What is known of a foot's contact.
+    """What is known of a foot's contact."""
 
-    Attributes:
-        is_early: whether it stands ahead of its plan.
-        since: for how long [s] it has done so; infinite if it has come down when it was planned to.
-        was_stance: whether it was planned to stand at the tick before.
-        is_awaited: whether it shall stand and has not met the ground yet.
-    """
-
-    is_early: bool
+    is_early: bool  #: whether it stands ahead of its plan
     since: float
-    was_stance: bool
-    is_awaited: bool
+    """For how long [s] it has done so; infinite if it has come down when it was planned to."""
+    was_stance: bool  #: whether it was planned to stand at the tick before
+    is_awaited: bool  #: whether it shall stand and has not met the ground yet
 
 
 @subroutine
@@ -117,21 +111,14 @@ class SwingConfig:
 
 
 class Swing(Record):
-    """How the swing of one foot has begun.
+    """How the swing of one foot has begun."""
 
-    Attributes:
-        start: where the foot was [m].
-        raised: height [m] by which its apex is higher than on smooth ground.
-        delay: share of it in which the foot only rises.
-        begun: share of the gait's swing that had passed by then.
-        peak: share of it at which the foot is highest; 0 until that is settled, at its first tick.
-    """
-
-    start: Array3
-    raised: float
-    delay: float
-    begun: float
+    start: Array3  #: where the foot was [m]
+    raised: float  #: height [m] by which its apex is higher than on smooth ground
+    delay: float  #: share of it in which the foot only rises
+    begun: float  #: share of the gait's swing that had passed by then
     peak: float
+    """Share of it at which the foot is highest; 0 until that is settled, at its first tick."""
 
 
 class Step(Record):

@@ -68,19 +68,12 @@ _TINY = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class BodyPose:
-    """Of the trunk, from that of one that walks level, facing ahead.
+    """Of the trunk, from that of one that walks level, facing ahead."""
 
-    Attributes:
-        height: above the walking height [m], negative is lower.
-        roll: positive lowers the right side [rad].
-        pitch: positive lowers the front [rad].
-        yaw: positive looks to the left of the heading [rad].
-    """
-
-    height: float = 0.0
-    roll: float = 0.0
-    pitch: float = 0.0
-    yaw: float = 0.0
+    height: float = 0.0  #: above the walking height [m], negative is lower
+    roll: float = 0.0  #: positive lowers the right side [rad]
+    pitch: float = 0.0  #: positive lowers the front [rad]
+    yaw: float = 0.0  #: positive looks to the left of the heading [rad]
 
     def __post_init__(self) -> None:
         """Make every component a float; raise CommandError unless it is a finite number."""

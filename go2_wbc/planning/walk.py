@@ -190,44 +190,26 @@ class Foot(Record):
 
 
 class Rest(Record):
-    """How the robot comes to rest.
+    """How the robot comes to rest."""
 
-    Attributes:
-        landings: how often feet have come down since it has had no command.
-        place: where the CoM shall be while the robot rests [m].
-        middle: of the feet at the last tick at rest [m].
-    """
-
-    landings: float
-    place: Float[np.ndarray, "2"]
-    middle: Float[np.ndarray, "3"]
+    landings: float  #: how often feet have come down since it has had no command
+    place: Float[np.ndarray, "2"]  #: where the CoM shall be while the robot rests [m]
+    middle: Float[np.ndarray, "3"]  #: of the feet at the last tick at rest [m]
 
 
 class PlannedForces(Record):
-    """What the MPC has planned last.
+    """What the MPC has planned last."""
 
-    Attributes:
-        next: when [s] it plans again.
-        f_world_feet: force [N] of each foot while it stands.
-    """
-
-    next: float
-    f_world_feet: Float[np.ndarray, "4 3"]
+    next: float  #: when [s] it plans again
+    f_world_feet: Float[np.ndarray, "4 3"]  #: force [N] of each foot while it stands
 
 
 class Planner(Record):
-    """State of the locomotion planner.
+    """State of the locomotion planner."""
 
-    Attributes:
-        time: of the last tick [s].
-        is_stepping: whether the gait is running.
-        delay: after which commands act [s].
-        horizon: what the MPC has looked at last.
-    """
-
-    time: float
-    is_stepping: bool
-    delay: float
+    time: float  #: of the last tick [s]
+    is_stepping: bool  #: whether the gait is running
+    delay: float  #: after which commands act [s]
     clock: Clock
     trunk: Trunk
     ground: Ground
@@ -235,7 +217,7 @@ class Planner(Record):
     rest: Rest
     feet: tuple[Foot, Foot, Foot, Foot]
     planned: PlannedForces
-    horizon: Horizon
+    horizon: Horizon  #: what the MPC has looked at last
     sight: Sight
 
 

@@ -48,25 +48,16 @@ LEAST_CHANGE = 1e-3
 
 
 class Lag(Record):
-    """What is known of how late commands act.
+    """What is known of how late commands act."""
 
-    Attributes:
-        tau_asked: torques of the last commands [N m], the newest first.
-        qdd: accelerations that they were to make [m/s^2, rad/s^2].
-        known: how many of them there are without a break.
-        misfit: mean square [N^2 m^2] of what was measured less what was asked, of each lag.
-        change: the same of the torques asked for, from the first lag to the last.
-        ticks: the lag that fits, in control periods.
-        acted: the one that fits this tick alone, if commands are late.
-    """
-
-    tau_asked: Float[np.ndarray, "11 12"]
-    qdd: Float[np.ndarray, "11 18"]
-    known: float
+    tau_asked: Float[np.ndarray, "11 12"]  #: torques of the last commands [N m], the newest first
+    qdd: Float[np.ndarray, "11 18"]  #: accelerations that they were to make [m/s^2, rad/s^2]
+    known: float  #: how many of them there are without a break
     misfit: Float[np.ndarray, "11"]
-    change: float
-    ticks: float
-    acted: float
+    """Mean square [N^2 m^2] of what was measured less what was asked, of each lag."""
+    change: float  #: the same of the torques asked for, from the first lag to the last
+    ticks: float  #: the lag that fits, in control periods
+    acted: float  #: the one that fits this tick alone, if commands are late
 
 
 @kernel

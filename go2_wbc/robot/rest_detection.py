@@ -35,23 +35,14 @@ bias is then off 0."""
 
 
 class Rest(Record):
-    """What is remembered of it.
+    """What is remembered of it."""
 
-    Attributes:
-        joint_speeds: smoothed [rad/s].
-        still_time: for which all has been at rest [s].
-        lying_time: for which something else than the feet has carried the robot [s].
-        lost_time: for which the estimate has been lost [s].
-        upset_time: for which no biases are learnt [s].
-        tumbled: whether the robot has.
-    """
-
-    joint_speeds: Array12
-    still_time: float
-    lying_time: float
-    lost_time: float
-    upset_time: float
-    tumbled: bool
+    joint_speeds: Array12  #: smoothed [rad/s]
+    still_time: float  #: for which all has been at rest [s]
+    lying_time: float  #: for which something else than the feet has carried the robot [s]
+    lost_time: float  #: for which the estimate has been lost [s]
+    upset_time: float  #: for which no biases are learnt [s]
+    tumbled: bool  #: whether the robot has
 
 
 @subroutine

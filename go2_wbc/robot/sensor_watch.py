@@ -134,23 +134,14 @@ class WatchedSensors(Record):
 
 @dataclass(frozen=True, slots=True)
 class WatchNumbers:
-    """What the robot is, to those who watch it.
+    """What the robot is, to those who watch it."""
 
-    Attributes:
-        legs: their lengths.
-        foot_radius: [m].
-        inertia: of each leg about its joints, standing [kg m^2].
-        weight: of the robot [N].
-        gravity: [m/s^2].
-        p_base_imu: place of the IMU in the base frame [m].
-    """
-
-    legs: Legs
-    foot_radius: float
-    inertia: Float[np.ndarray, "4 3 3"]
-    weight: float
-    gravity: float
-    p_base_imu: Array3
+    legs: Legs  #: their lengths
+    foot_radius: float  #: [m]
+    inertia: Float[np.ndarray, "4 3 3"]  #: of each leg about its joints, standing [kg m^2]
+    weight: float  #: of the robot [N]
+    gravity: float  #: [m/s^2]
+    p_base_imu: Array3  #: place of the IMU in the base frame [m]
 
     @classmethod
     def of(cls, model: RobotModel) -> WatchNumbers:

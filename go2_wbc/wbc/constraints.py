@@ -118,12 +118,9 @@ class StanceFeetStill(Equality):
     J a + dJ/dt v = -damping J v in the world frame. With 0 on the right, what integration leaves of
     a velocity would stay for ever; so it decays as exp(-damping t) (Baumgarte, Comp. Meth. Appl.
     Mech. Eng. 1, 1972). There is no term of position: a foot may stand anywhere.
-
-    Attributes:
-        damping: rate [1/s] at which a remaining velocity of the contact point is taken out.
     """
 
-    damping: float
+    damping: float  #: rate [1/s] at which a remaining velocity of the contact point is taken out
     name = "stance feet"
     unit = "m/s^2"
 
@@ -216,12 +213,9 @@ class TorqueLimits(Inequality):
     """tau within what the motors give, tau being the joint rows of M a + h - J' f.
 
     The limits are those at the measured joint speeds. Without torque they are always met.
-
-    Attributes:
-        motor: the motors, at the share of their torque that may be used.
     """
 
-    motor: MotorModel
+    motor: MotorModel  #: the motors, at the share of their torque that may be used
     name = "torque limits"
     unit = "N m"
 

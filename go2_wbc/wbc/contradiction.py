@@ -74,21 +74,14 @@ class Demand:
 
 @dataclass(frozen=True, slots=True)
 class Contradiction:
-    """Why no decision keeps all limits.
+    """Why no decision keeps all limits."""
 
-    Attributes:
-        name: the limit that is to blame.
-        against: the limit that it contradicts most; "" if it leaves nothing by itself.
-        demand: what of it would do; None if no limit alone could give way.
-        others: what else could give way alone.
-        gave_way: what gave way in the nearest answer, which is followed; nothing if there is none.
-    """
-
-    name: str
-    against: str
-    demand: Demand | None
-    others: tuple[Demand, ...]
+    name: str  #: the limit that is to blame
+    against: str  #: the limit that it contradicts most; "" if it leaves nothing by itself
+    demand: Demand | None  #: what of it would do; None if no limit alone could give way
+    others: tuple[Demand, ...]  #: what else could give way alone
     gave_way: tuple[str, ...]
+    """What gave way in the nearest answer, which is followed; nothing if there is none."""
 
     @staticmethod
     def of(problem: Problem) -> Contradiction:

@@ -70,19 +70,12 @@ _TINY = 1e-9  # a multiplier below this share of the greatest is rounding
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """What one unit more of a limit gives.
+    """What one unit more of a limit gives."""
 
-    Attributes:
-        what: the row of a task that gains most of the cost.
-        amount: by how much its error falls for each unit of the limit.
-        error: of the row now.
-        unit: of amount and error.
-    """
-
-    what: str
-    amount: float
-    error: float
-    unit: str
+    what: str  #: the row of a task that gains most of the cost
+    amount: float  #: by how much its error falls for each unit of the limit
+    error: float  #: of the row now
+    unit: str  #: of amount and error
 
 
 @dataclass(frozen=True, slots=True)

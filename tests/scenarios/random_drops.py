@@ -29,23 +29,14 @@ UPRIGHT = np.radians(6)
 
 @dataclass(frozen=True, slots=True)
 class Drop:
-    """One drop and what came of it.
+    """One drop and what came of it."""
 
-    Attributes:
-        seed: makes it repeatable.
-        q_joints: angles [rad] in which the legs came to rest.
-        tilt: of the trunk at rest [rad].
-        ok: whether the robot stands, by its own word and by the simulator's state.
-        reason: its own, in plain words.
-        duration: robot time [s] that it took.
-    """
-
-    seed: int
-    q_joints: tuple[float, ...]
-    tilt: float
-    ok: bool
-    reason: str
-    duration: float
+    seed: int  #: makes it repeatable
+    q_joints: tuple[float, ...]  #: angles [rad] in which the legs came to rest
+    tilt: float  #: of the trunk at rest [rad]
+    ok: bool  #: whether the robot stands, by its own word and by the simulator's state
+    reason: str  #: its own, in plain words
+    duration: float  #: robot time [s] that it took
 
     def __str__(self) -> str:
         """One line."""

@@ -78,15 +78,10 @@ pytestmark = needs_ros2
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A robot's namespace, and what is started there; it ends with the scene.
+    """A robot's namespace, and what is started there; it ends with the scene."""
 
-    Attributes:
-        probe: watches the robot.
-        exits: what is to be ended.
-    """
-
-    probe: WatchingProbe
-    exits: ExitStack
+    probe: WatchingProbe  #: watches the robot
+    exits: ExitStack  #: what is to be ended
 
     def serve(self, says: str = "serving /") -> Process:
         """A server; see ``serving``."""
