@@ -24,21 +24,13 @@ from go2_wbc.robot.description import find_profile
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """One measured quantity.
+    """One measured quantity."""
 
-    Attributes:
-        name: what was measured.
-        measured: in ``unit``; nan if it could not be measured.
-        unit: unit of all three numbers.
-        asked: what it should be, or None if nothing was asked.
-        tolerance: greatest accepted distance from ``asked``; None accepts any.
-    """
-
-    name: str
-    measured: float
-    unit: str
-    asked: float | None = None
-    tolerance: float | None = None
+    name: str  #: what was measured
+    measured: float  #: in ``unit``; nan if it could not be measured
+    unit: str  #: unit of all three numbers
+    asked: float | None = None  #: what it should be, or None if nothing was asked
+    tolerance: float | None = None  #: greatest accepted distance from ``asked``; None accepts any
 
     @property
     def is_met(self) -> bool:
@@ -82,28 +74,21 @@ class StepResult:
 
 @dataclass(frozen=True, slots=True)
 class DemoTotals:
-    """Figures over all steps.
+    """Figures over all steps."""
 
-    Attributes:
-        peak_torque_ratio: greatest |torque| / limit of any joint since the controller started.
-        peak_speed_ratio: greatest |joint velocity| / limit of any joint since then; MuJoCo does
-            not enforce it, above 1 is not physical.
-        least_support_margin: least distance [m] of the CoM's ground projection to the edge of the
-            support triangle while on three legs; nan if it never stood on three.
-        least_foot_load: least normal force [N] of a supporting foot while on three legs; nan as
-            above.
-        qp_failures: ticks in which the whole-body QP had no solution.
-        robot_time: time [s] that passed for the robot.
-        cpu_time: processor time [s] of control and physics for it, start-up and measuring excluded.
-    """
-
-    peak_torque_ratio: float
+    peak_torque_ratio: float  #: greatest |torque| / limit of any joint since the controller started
     peak_speed_ratio: float
+    """Greatest |joint velocity| / limit of any joint since then; MuJoCo does not enforce it, above
+    1 is not physical."""
     least_support_margin: float
+    """Least distance [m] of the CoM's ground projection to the edge of the support triangle while
+    on three legs; nan if it never stood on three."""
     least_foot_load: float
-    qp_failures: int
-    robot_time: float
+    """Least normal force [N] of a supporting foot while on three legs; nan as above."""
+    qp_failures: int  #: ticks in which the whole-body QP had no solution
+    robot_time: float  #: time [s] that passed for the robot
     cpu_time: float
+    """Processor time [s] of control and physics for it, start-up and measuring excluded."""
 
     @property
     def real_time_factor(self) -> float:

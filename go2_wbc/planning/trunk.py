@@ -202,41 +202,27 @@ def pose_turn(yaw: float, pose: Array4, rate: Array4, turn: Array3, w: Array3) -
 
 
 class Command(Record):
-    """What the planner is asked for.
+    """What the planner is asked for."""
 
-    Attributes:
-        velocity: ahead, left [m/s], turning [rad/s], in the heading frame.
-        pose: of the trunk: height [m], roll, pitch, yaw [rad]; see ``BodyPose``.
-    """
-
-    velocity: Array3
-    pose: Array4
+    velocity: Array3  #: ahead, left [m/s], turning [rad/s], in the heading frame
+    pose: Array4  #: of the trunk: height [m], roll, pitch, yaw [rad]; see ``BodyPose``
 
 
 class Trunk(Record):
-    """Where the trunk shall be.
+    """Where the trunk shall be."""
 
-    Attributes:
-        yaw: heading [rad].
-        position: of the CoM, on the level [m].
-        velocity: ramped command in the heading frame [m/s], [rad/s].
-        missing: what of the command ahead and to the left has yet to be ramped [m/s].
-        acceleration: at which that happens, smoothed, in the heading frame [m/s^2].
-        height_offset: what is added to the wanted height against a load [m].
-        lean_offset: turn about x and y of the world [rad] that is added against the lean.
-        pose: on top of walking level: height [m], roll, pitch, yaw [rad].
-        pose_rate: of these, per second.
-    """
-
-    yaw: float
-    position: Float[np.ndarray, "2"]
-    velocity: Array3
+    yaw: float  #: heading [rad]
+    position: Float[np.ndarray, "2"]  #: of the CoM, on the level [m]
+    velocity: Array3  #: ramped command in the heading frame [m/s], [rad/s]
     missing: Float[np.ndarray, "2"]
+    """What of the command ahead and to the left has yet to be ramped [m/s]."""
     acceleration: Float[np.ndarray, "2"]
-    height_offset: float
+    """At which that happens, smoothed, in the heading frame [m/s^2]."""
+    height_offset: float  #: what is added to the wanted height against a load [m]
     lean_offset: Float[np.ndarray, "2"]
-    pose: Array4
-    pose_rate: Array4
+    """Turn about x and y of the world [rad] that is added against the lean."""
+    pose: Array4  #: on top of walking level: height [m], roll, pitch, yaw [rad]
+    pose_rate: Array4  #: of these, per second
 
 
 @subroutine

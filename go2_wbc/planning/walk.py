@@ -137,31 +137,20 @@ class LocomotionConfig:
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """The numbers of a walk.
+    """The numbers of a walk."""
 
-    Attributes:
-        config: of the planner, with the apex of the gait's swing.
-        cadence: the gait.
-        height: of the CoM above where feet that stayed round would end [m].
-        mass: of the robot [kg].
-        gravity: [m/s^2].
-        foot_radius: [m].
-        p_base_feet_nominal: places of the feet below the hips, from the base [m].
-        stands_beside_com: whether at times only the feet of one side, or of one end, stand.
-        p_base_hips: where the thighs' axes meet the legs' planes, in the base frame [m].
-        link: length of a thigh, and of a calf [m].
-    """
-
-    config: LocomotionConfig
-    cadence: Cadence
-    height: float
-    mass: float
-    gravity: float
-    foot_radius: float
+    config: LocomotionConfig  #: of the planner, with the apex of the gait's swing
+    cadence: Cadence  #: the gait
+    height: float  #: of the CoM above where feet that stayed round would end [m]
+    mass: float  #: of the robot [kg]
+    gravity: float  #: [m/s^2]
+    foot_radius: float  #: [m]
     p_base_feet_nominal: Float[np.ndarray, "4 3"]
-    stands_beside_com: bool
+    """Places of the feet below the hips, from the base [m]."""
+    stands_beside_com: bool  #: whether at times only the feet of one side, or of one end, stand
     p_base_hips: Float[np.ndarray, "4 3"]
-    link: float
+    """Where the thighs' axes meet the legs' planes, in the base frame [m]."""
+    link: float  #: length of a thigh, and of a calf [m]
 
     @staticmethod
     def of(model: RobotModel, gait: Gait, config: LocomotionConfig) -> Walk:

@@ -55,15 +55,10 @@ class Foot(Record):
 
 
 class Level(Record):
-    """The ground, as far as it is level.
+    """The ground, as far as it is level."""
 
-    Attributes:
-        height: [m].
-        doubt_time: for which it is not believed [s].
-    """
-
-    height: float
-    doubt_time: float
+    height: float  #: [m]
+    doubt_time: float  #: for which it is not believed [s]
 
 
 @subroutine

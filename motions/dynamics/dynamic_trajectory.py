@@ -48,21 +48,13 @@ _ARRAYS = {
 
 @dataclass(frozen=True, slots=True)
 class Miss:
-    """How far one thing is from where it was asked to be.
+    """How far one thing is from where it was asked to be."""
 
-    Attributes:
-        subject: "trunk" or the name of a foot.
-        phase: label of the phase at whose end it was asked.
-        time: [s] from the start.
-        position: distance [m].
-        angle: angle [rad], of the trunk, whole turns that were lost included; 0 of a foot.
-    """
-
-    subject: str
-    phase: str
-    time: float
-    position: float
-    angle: float
+    subject: str  #: "trunk" or the name of a foot
+    phase: str  #: label of the phase at whose end it was asked
+    time: float  #: [s] from the start
+    position: float  #: distance [m]
+    angle: float  #: angle [rad], of the trunk, whole turns that were lost included; 0 of a foot
 
     def __str__(self) -> str:
         angle = "" if self.subject != "trunk" else f", {np.degrees(self.angle):.1f} deg"
