@@ -65,16 +65,11 @@ LIMITS = _limits()
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A stretch of time with one label.
+    """A stretch of time with one label."""
 
-    Attributes:
-        start, end: seconds after the start of the recording.
-        label: what the robot was doing.
-    """
-
-    start: float
-    end: float
-    label: str
+    start: float  #: seconds after the start of the recording
+    end: float  #: seconds after the start of the recording
+    label: str  #: what the robot was doing
 
 
 @typed()

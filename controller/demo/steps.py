@@ -49,22 +49,15 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True)
 class StepResult:
-    """What came of one step.
+    """What came of one step."""
 
-    Attributes:
-        name, label: identify the step, and say what was to be done.
-        ok, reason: whether the measurements show that it was done; why, in plain words.
-        start, duration: plant time [s] at which it began, and robot time [s] that it took.
-        figures: what was measured.
-    """
-
-    name: str
-    label: str
-    ok: bool
-    reason: str
-    start: float
-    duration: float
-    figures: tuple[Measurement, ...] = ()
+    name: str  #: identifies the step
+    label: str  #: says what was to be done
+    ok: bool  #: whether the measurements show that it was done
+    reason: str  #: why, in plain words
+    start: float  #: plant time [s] at which it began
+    duration: float  #: robot time [s] that it took
+    figures: tuple[Measurement, ...] = ()  #: what was measured
 
     @property
     def verdict(self) -> str:
@@ -150,18 +143,14 @@ class StepRun:
 
 @dataclass(frozen=True, slots=True)
 class DemoStep:
-    """One step of the demo.
+    """One step of the demo."""
 
-    Attributes:
-        name, label: identify the step in reports, and say what is done, in at most 21 characters.
-        act: does it; False means that it was not done, None that the figures must tell.
-        measure: figures from what was measured, never from what was commanded.
-    """
-
-    name: str
-    label: str
+    name: str  #: identifies the step in reports
+    label: str  #: says what is done, in at most 21 characters
     act: Callable[[GO2Controller], bool | None]
+    """Does it; False means that it was not done, None that the figures must tell."""
     measure: Callable[[StepRun], tuple[Measurement, ...]]
+    """Figures from what was measured, never from what was commanded."""
 
 
 def yaw_angles(recording: Recording) -> Float[np.ndarray, " n"]:
@@ -300,17 +289,12 @@ TOTALS_RATE = 500.0  #: Samples a second for the least margins and loads: short 
 
 @dataclass(frozen=True, slots=True)
 class DemoProgress:
-    """Where a running demo is; told once when a step begins and once when it has ended.
+    """Where a running demo is; told once when a step begins and once when it has ended."""
 
-    Attributes:
-        index, count, label: of the step, from 0, how many there are, and what it does.
-        result: what came of it; None when it begins.
-    """
-
-    index: int
-    count: int
-    label: str
-    result: StepResult | None = None
+    index: int  #: of the step, from 0
+    count: int  #: how many there are
+    label: str  #: what it does
+    result: StepResult | None = None  #: what came of it; None when it begins
 
 
 def run_demo(

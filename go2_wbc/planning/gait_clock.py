@@ -80,24 +80,16 @@ class Cadence:
 
 
 class Clock(Record):
-    """Phase and form of the gait.
+    """Phase and form of the gait."""
 
-    Attributes:
-        time: since the stride's start or a whole number of strides before [s].
-        period, duty, offsets, width: form of the gait as it is now.
-        goal: offsets to which those of now were aligned.
-        is_rough: whether its strides are those on rough ground.
-        is_seen: whether they are those on uneven ground that is seen.
-    """
-
-    time: float
-    period: float
-    duty: float
-    offsets: Float[np.ndarray, "4"]
-    width: float
-    goal: Float[np.ndarray, "4"]
-    is_rough: bool
-    is_seen: bool
+    time: float  #: since the stride's start or a whole number of strides before [s]
+    period: float  #: [s] of the gait as it is now, whose form the next three are, too
+    duty: float  #: of the same
+    offsets: Float[np.ndarray, "4"]  #: of the same
+    width: float  #: of the same
+    goal: Float[np.ndarray, "4"]  #: offsets to which those of now were aligned
+    is_rough: bool  #: whether its strides are those on rough ground
+    is_seen: bool  #: whether they are those on uneven ground that is seen
 
 
 def resting_gait(gait: Gait) -> Gait:

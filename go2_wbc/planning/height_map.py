@@ -56,29 +56,19 @@ than a round one. Without it feet and scans pull the map to and fro."""
 
 
 class HeightMap(Record):
-    """What is known of the ground around the robot.
+    """What is known of the ground around the robot."""
 
-    Attributes:
-        is_used: whether there has been a scan.
-        shift: what is added to every height [m]; see the module.
-        stood: time [s] for which each foot has stood.
-        name: of the cell that a place of the ring holds; 0 for none.
-        height: of the cells [m].
-        variance: of the heights [m^2].
-        lower: how many scans in a row have found a cell lower than it is believed.
-        highest, total, count: of a scan's points, while it is taken in.
-    """
-
-    is_used: bool
-    shift: float
-    stood: Float[np.ndarray, "4"]
-    name: Float[np.ndarray, "160 160"]
-    height: Float[np.ndarray, "160 160"]
-    variance: Float[np.ndarray, "160 160"]
+    is_used: bool  #: whether there has been a scan
+    shift: float  #: what is added to every height [m]; see the module
+    stood: Float[np.ndarray, "4"]  #: time [s] for which each foot has stood
+    name: Float[np.ndarray, "160 160"]  #: of the cell that a place of the ring holds; 0 for none
+    height: Float[np.ndarray, "160 160"]  #: of the cells [m]
+    variance: Float[np.ndarray, "160 160"]  #: of the heights [m^2]
     lower: Float[np.ndarray, "160 160"]
-    highest: Float[np.ndarray, "160 160"]
-    total: Float[np.ndarray, "160 160"]
-    count: Float[np.ndarray, "160 160"]
+    """How many scans in a row have found a cell lower than it is believed."""
+    highest: Float[np.ndarray, "160 160"]  #: of a scan's points, while it is taken in
+    total: Float[np.ndarray, "160 160"]  #: of the same
+    count: Float[np.ndarray, "160 160"]  #: of the same
 
 
 @subroutine

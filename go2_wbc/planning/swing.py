@@ -122,26 +122,16 @@ class Swing(Record):
 
 
 class Step(Record):
-    """Where and how a foot swings that is placed by sight; see ``sighted_steps``.
+    """Where and how a foot swings that is placed by sight; see ``sighted_steps``."""
 
-    Attributes:
-        is_sighted: whether this swing is.
-        next: when [s] the foothold is chosen again.
-        chosen: the foothold, for the centre of the foot [m].
-        goal: where the foot is led, on its way there [m].
-        top: greatest height of the swing [m].
-        peak: share of the swing at which it is there.
-        begin, end: shares between which the foot goes ahead.
-    """
-
-    is_sighted: bool
-    next: float
-    chosen: Array3
-    goal: Array3
-    top: float
-    peak: float
-    begin: float
-    end: float
+    is_sighted: bool  #: whether this swing is
+    next: float  #: when [s] the foothold is chosen again
+    chosen: Array3  #: the foothold, for the centre of the foot [m]
+    goal: Array3  #: where the foot is led, on its way there [m]
+    top: float  #: greatest height of the swing [m]
+    peak: float  #: share of the swing at which it is there
+    begin: float  #: share from which on the foot goes ahead
+    end: float  #: share until which it does
 
 
 @subroutine

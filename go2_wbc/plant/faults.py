@@ -84,17 +84,12 @@ _VALUES: Mapping[FaultKind, float] = {
 
 @dataclass(frozen=True, slots=True)
 class InjectedFault:
-    """Something that breaks.
+    """Something that breaks."""
 
-    Attributes:
-        kind, part, at: what breaks how, and when [s].
-        value: see ``FaultKind``.
-    """
-
-    kind: FaultKind
-    part: str
-    at: float
-    value: float
+    kind: FaultKind  #: how it breaks
+    part: str  #: what breaks
+    at: float  #: when [s]
+    value: float  #: see ``FaultKind``
 
     @property
     def index(self) -> int:

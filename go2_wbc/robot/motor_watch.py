@@ -33,19 +33,13 @@ LASTS = 0.12
 
 
 class WatchedMotors(Record):
-    """What is remembered from tick to tick.
+    """What is remembered from tick to tick."""
 
-    Attributes:
-        given, asked: the sums [N^2 m^2].
-        weak_time: for how long the share has been too low [s].
-        weak_given, weak_asked: sums over that time [N^2 m^2].
-    """
-
-    given: Array12
-    asked: Array12
-    weak_time: Array12
-    weak_given: Array12
-    weak_asked: Array12
+    given: Array12  #: the sum of what was given [N^2 m^2]
+    asked: Array12  #: the sum of what was asked [N^2 m^2]
+    weak_time: Array12  #: for how long the share has been too low [s]
+    weak_given: Array12  #: ``given`` over that time [N^2 m^2]
+    weak_asked: Array12  #: ``asked`` over that time [N^2 m^2]
 
 
 @kernel

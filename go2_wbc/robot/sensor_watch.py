@@ -83,53 +83,33 @@ STANDING = np.tile([0.0, 0.8, -1.6], 4)
 
 
 class WatchedSensors(Record):
-    """What is remembered from reading to reading.
+    """What is remembered from reading to reading."""
 
-    Attributes:
-        has_begun: 1 once there has been one.
-        step: the last time between two [s].
-        whole: how many came since one was lost: what turned meanwhile is not judged.
-        q, v: the last angles [rad] and speeds [rad/s], as they were read.
-        shift: what is taken off the angles [rad].
-        dv: smoothed accelerations of the joints [rad/s^2].
-        same: for how long a joint has read the very same [s].
-        force, rise: the last of each foot [N], as it was read, and its last change.
-        noise: of it, while it is free and while it stands; see ``NOISY`` [N].
-        force_same: for how long it has been the very same [s].
-        load: of the leg, when that began [N].
-        stood: for how long a foot has borne its leg's load [s].
-        against: for how long a foot's force has contradicted the leg's torques [s].
-        gyro, accelerometer: the last, as they were read.
-        speed_noise: of the joints' speeds and the gyro.
-        imu: the IMU against feet that stand.
-        stuck, force_is_wrong, gyro_is_off, accelerometer_is_off: 1 for what is broken.
-        jumped: 1 for an encoder whose shift is not 0.
-    """
-
-    has_begun: float
-    step: float
-    whole: float
-    q: Array12
-    v: Array12
-    shift: Array12
-    dv: Array12
-    same: Array12
-    force: Array4
-    rise: Array4
+    has_begun: float  #: 1 once there has been one
+    step: float  #: the last time between two [s]
+    whole: float  #: how many came since one was lost: what turned meanwhile is not judged
+    q: Array12  #: the last angles [rad], as they were read
+    v: Array12  #: the last speeds [rad/s], as they were read
+    shift: Array12  #: what is taken off the angles [rad]
+    dv: Array12  #: smoothed accelerations of the joints [rad/s^2]
+    same: Array12  #: for how long a joint has read the very same [s]
+    force: Array4  #: the last of each foot [N], as it was read
+    rise: Array4  #: its last change [N]
     noise: Float[np.ndarray, "2 4"]
-    force_same: Array4
-    load: Array4
-    stood: Array4
-    against: Array4
-    gyro: Array3
-    accelerometer: Array3
-    speed_noise: SpeedNoise
-    imu: WatchedImu
-    stuck: Array12
-    jumped: Array12
-    force_is_wrong: Array4
-    gyro_is_off: float
-    accelerometer_is_off: float
+    """Of the force, while a foot is free and while it stands; see ``NOISY`` [N]."""
+    force_same: Array4  #: for how long it has been the very same [s]
+    load: Array4  #: of the leg, when that began [N]
+    stood: Array4  #: for how long a foot has borne its leg's load [s]
+    against: Array4  #: for how long a foot's force has contradicted the leg's torques [s]
+    gyro: Array3  #: the last, as it was read
+    accelerometer: Array3  #: the last, as it was read
+    speed_noise: SpeedNoise  #: of the joints' speeds and the gyro
+    imu: WatchedImu  #: the IMU against feet that stand
+    stuck: Array12  #: 1 for an encoder that is
+    jumped: Array12  #: 1 for an encoder whose shift is not 0
+    force_is_wrong: Array4  #: 1 for a foot's force that is
+    gyro_is_off: float  #: 1 if it is
+    accelerometer_is_off: float  #: 1 if it is
 
 
 @dataclass(frozen=True, slots=True)

@@ -108,23 +108,15 @@ class RobotState:
 
 @dataclass(frozen=True, slots=True)
 class SensorReading:
-    """What the robot measures at one instant.
+    """What the robot measures at one instant."""
 
-    Attributes:
-        time: robot time [s].
-        gyro: angular velocity [rad/s] in the base frame.
-        accelerometer: specific force [m/s^2] in the base frame; +9.81 upwards at rest.
-        q_joints, v_joints, tau: joint angles [rad], velocities [rad/s] and torques [N m].
-        foot_forces: normal force at each foot [N].
-    """
-
-    time: float
-    gyro: Array3
-    accelerometer: Array3
-    q_joints: Array12
-    v_joints: Array12
-    tau: Array12
-    foot_forces: Array4
+    time: float  #: robot time [s]
+    gyro: Array3  #: angular velocity [rad/s] in the base frame
+    accelerometer: Array3  #: specific force [m/s^2] in the base frame; +9.81 upwards at rest
+    q_joints: Array12  #: joint angles [rad]
+    v_joints: Array12  #: joint velocities [rad/s]
+    tau: Array12  #: joint torques [N m]
+    foot_forces: Array4  #: normal force at each foot [N]
 
 
 @dataclass(frozen=True, slots=True)

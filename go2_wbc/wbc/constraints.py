@@ -286,18 +286,13 @@ class JointLimits(Inequality):
     no solution, the root counts as 0: the joint has to come back. No bound asks for more than
     ``braking``; whether the legs can brake that hard, at the torque limits and with their feet on
     the ground, is for the QP to tell.
-
-    Attributes:
-        q_lower, q_upper, speed: limits of position [rad] and speed [rad/s].
-        braking: deceleration [rad/s^2] that is always available.
-        horizon: time [s] in which a bound on the velocity must be met.
     """
 
-    q_lower: Array12
-    q_upper: Array12
-    speed: Array12
-    braking: float
-    horizon: float
+    q_lower: Array12  #: limit of position [rad]
+    q_upper: Array12  #: limit of position [rad]
+    speed: Array12  #: limit of speed [rad/s]
+    braking: float  #: deceleration [rad/s^2] that is always available
+    horizon: float  #: time [s] in which a bound on the velocity must be met
     name = "joint limits"
     unit = "rad/s^2"
 

@@ -55,18 +55,12 @@ _TRIFLES = {"m/s^2": 0.01, "N": 0.1, "N m": 0.01, "rad/s^2": 0.1}  # of what gav
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """A limit that alone would have to give way.
+    """A limit that alone would have to give way."""
 
-    Attributes:
-        name: what it is, of which foot or joint.
-        needs, has: what would do, and what there is [unit].
-        unit: of both.
-    """
-
-    name: str
-    needs: float
-    has: float
-    unit: str
+    name: str  #: what it is, of which foot or joint
+    needs: float  #: what would do [unit]
+    has: float  #: what there is [unit]
+    unit: str  #: of both
 
     def __str__(self) -> str:
         return f"{self.name}: needs {self.needs:.3g} {self.unit}, has {self.has:.3g}"

@@ -68,34 +68,26 @@ class DynamicTrajectory:
 
     The frame has z up, x ahead, and its origin on the ground in the middle of the feet at the
     start. Row ``k`` of what has n rows holds from ``times[k]`` to ``times[k + 1]``.
-
-    Attributes:
-        times: (n+1,) knots [s], from 0.
-        q: (n+1, 19) base position [m], quaternion x y z w, joint angles [rad].
-        v: (n+1, 18) base linear [m/s] and angular velocity [rad/s] in the base frame, joints.
-        tau: (n, 12) joint torques [N m].
-        forces: (n, 4, 3) forces of the ground on the feet [N], in the problem's frame.
-        stance: (n, 4) feet that stand.
-        gains: (n, 12, 36) feedback of a state error (as Pinocchio's ``difference`` of planned and
-            measured q, then of v) into torques: tau - gains @ error.
-        p_feet: (n+1, 4, 3) centres of the feet [m].
-        iterations, cost: of the solver, over all its starts, and at the end.
-        misses: what was asked at the phases' ends, and how far the plan is from it.
-        lag: time [s] by which the plan is late against a motion that was written as a whole.
     """
 
-    times: Float[np.ndarray, " n1"]
+    times: Float[np.ndarray, " n1"]  #: (n+1,) knots [s], from 0
     q: Float[np.ndarray, "n1 19"]
+    """(n+1, 19) base position [m], quaternion x y z w, joint angles [rad]."""
     v: Float[np.ndarray, "n1 18"]
-    tau: Float[np.ndarray, "n 12"]
+    """(n+1, 18) base linear [m/s] and angular velocity [rad/s] in the base frame, joints."""
+    tau: Float[np.ndarray, "n 12"]  #: (n, 12) joint torques [N m]
     forces: Float[np.ndarray, "n 4 3"]
-    stance: Bool[np.ndarray, "n 4"]
+    """(n, 4, 3) forces of the ground on the feet [N], in the problem's frame."""
+    stance: Bool[np.ndarray, "n 4"]  #: (n, 4) feet that stand
     gains: Float[np.ndarray, "n 12 36"]
-    p_feet: Float[np.ndarray, "n1 4 3"]
-    iterations: int
-    cost: float
-    misses: tuple[Miss, ...]
+    """(n, 12, 36) feedback of a state error (as Pinocchio's ``difference`` of planned and measured
+    q, then of v) into torques: tau - gains @ error."""
+    p_feet: Float[np.ndarray, "n1 4 3"]  #: (n+1, 4, 3) centres of the feet [m]
+    iterations: int  #: of the solver, over all its starts
+    cost: float  #: at the end
+    misses: tuple[Miss, ...]  #: what was asked at the phases' ends, and how far the plan is from it
     lag: float = 0.0
+    """Time [s] by which the plan is late against a motion that was written as a whole."""
 
     @property
     def duration(self) -> float:

@@ -82,14 +82,10 @@ def solve(
 
 @dataclass(frozen=True, slots=True)
 class Solved:
-    """A problem and its plan, from which the search for another of the same phases may begin.
+    """A problem and its plan, from which the search for another of the same phases may begin."""
 
-    Attributes:
-        problem, plan: what was asked, and what was found.
-    """
-
-    problem: PhaseProblem
-    plan: DynamicTrajectory
+    problem: PhaseProblem  #: what was asked
+    plan: DynamicTrajectory  #: what was found
 
 
 def continued(
