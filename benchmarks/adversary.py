@@ -26,10 +26,8 @@ from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker
 
 PLAYS = 20  # Of a search
-STATED = 0.95
-"""Chance from which on a pass counts."""
-FIRST = 9000
-"""First seed that judges: whoever mends the check looks at lower ones only."""
+STATED = 0.95  #: Chance from which on a pass counts
+FIRST = 9000  #: First seed that judges: whoever mends the check looks at lower ones only
 MOST_CHECKS, HALVINGS = 60, 3
 """Changes that are tried for one play, and how often one that is refused is halved."""
 CHANGED, WIDEST, NARROWEST = 0.3, 0.3, 0.03

@@ -53,8 +53,7 @@ STAGES: dict[str, tuple[str, ...]] = {
 }
 """What a tick makes, in its order, and the fields that are looked at; a report has its own."""
 
-Values = Mapping[str, Float[np.ndarray, " n"]]
-"""Numbers of one stage, by their names."""
+Values = Mapping[str, Float[np.ndarray, " n"]]  #: Numbers of one stage, by their names
 Step = Callable[[GO2Controller], object]
 
 

@@ -50,10 +50,8 @@ from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 
 FIRST_SEED = 14000
 """Seed of the first trial that is judged; those from 4000 on were, and causes found on them."""
-START_TIME, WINDOW = 3.0, 20.0
-"""Time [s] after a command that is left out, and that is measured."""
-BEYOND = Config(envelope=VelocityEnvelope(forward=4.0))
-"""Of the runs that are beyond the envelope."""
+START_TIME, WINDOW = 3.0, 20.0  #: Time [s] after a command that is left out, and that is measured
+BEYOND = Config(envelope=VelocityEnvelope(forward=4.0))  #: Of the runs that are beyond the envelope
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,14 +16,12 @@ LEAST_SAMPLES = 20
 CENTRE_SPREAD = 2.0
 """Standard deviation of a centre about 0 before anything is seen, as of all that follow."""
 USUAL_WIDTH = 0.3  # Width before anything is seen
-WIDTH_SPREAD = 1.5
-"""Standard deviation of the logarithm of a width before anything is seen."""
+WIDTH_SPREAD = 1.5  #: Standard deviation of the logarithm of a width before anything is seen
 FARTHEST, WIDTHS = (-10.0, 10.0), (1e-3, 3.0)
 """Centres and the rest, and widths, that are looked at."""
 LEAST_SPREAD = 1e-2
 """Of a margin, as a share of its size, below which it counts as the same in all runs."""
-MOST = 20.0
-"""Value of asinh beyond which more of it, or an infinite margin, tells nothing."""
+MOST = 20.0  #: Value of asinh beyond which more of it, or an infinite margin, tells nothing
 REST_SPREAD = 5.0  # Standard deviation of the log odds of the rest
 USUAL_LEAK, LEAK_SPREAD = -3.0, 1.5
 """Log odds of the leak before anything is seen, and their standard deviation."""

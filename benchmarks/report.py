@@ -11,10 +11,8 @@ from benchmarks.study import Metric, Results, Study, TrialResult
 
 WIDTH = 80
 _LINE = " {quantity:<26}{threshold:>12}{n:>4}{mean:>8}{sd:>8}{worst:>8}{seed:>5}{falls:>5}{verdict}"
-_COLUMN = 8
-"""Width of a number's column in it."""
-_NOTES = 3
-"""Failed seeds of a metric whose reasons are printed; JSON has all."""
+_COLUMN = 8  #: Width of a number's column in it
+_NOTES = 3  #: Failed seeds of a metric whose reasons are printed; JSON has all
 
 
 @dataclass(frozen=True, slots=True)

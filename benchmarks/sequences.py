@@ -44,8 +44,7 @@ from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, compile_timeline, load_motion
 
 FOOT_RADIUS, STAND_HEIGHT = find_profile().foot_radius, find_profile().stand_height
-FIRST_SEED = 9100
-"""Seed of the first trial that is judged."""
+FIRST_SEED = 9100  #: Seed of the first trial that is judged
 CALLS = 7
 HANGS = 90.0
 """Time [s] of the robot, and of a thread, after which a call hangs: no call here may take 40."""
@@ -63,8 +62,7 @@ LYING_HEIGHT = 0.1  # m; base of a robot that lies
 MOTIONS = ("bow", "wave", "nod", "march", "push_ups", "stretch", "side_shuffle", "twist")
 POSTURES = ("stand", "sit", "lie_down", "recover")
 GOALS = ("turn_left", "turn_right", "move_forward")
-OTHERS = ("stop", "damp", "cancel", "stand", "move")
-"""What a second thread calls."""
+OTHERS = ("stop", "damp", "cancel", "stand", "move")  #: What a second thread calls
 ENDING: Mapping[str, tuple[str, ...]] = {
     "damp": (*POSTURES, *GOALS, "walk", "high_five", "play", "wait", "stop"),
     "stop": GOALS,
@@ -83,8 +81,7 @@ WRONG: tuple[tuple[str, tuple[Any, ...]], ...] = (
 """Calls whose arguments are wrong."""
 STEEP_GAITS = ("pace", "bound")
 """Both feet of a side, or of an end, stand beside the CoM: that asks for more friction than 0.3."""
-FREE = ("recover", "wait", "damp", "stop")
-"""What a robot that has fallen may be told."""
+FREE = ("recover", "wait", "damp", "stop")  #: What a robot that has fallen may be told
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,8 +67,7 @@ class Tick:
         return self.reference if self.is_packed else replace(self.reference)
 
 
-Ticks = Mapping[int, Sequence[Tick]]
-"""By number of stance feet."""
+Ticks = Mapping[int, Sequence[Tick]]  #: By number of stance feet
 
 
 class Recorder(WholeBodyController):

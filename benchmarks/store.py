@@ -20,10 +20,8 @@ from go2_wbc.config import Config
 from go2_wbc.errors import ConfigError
 
 ROOT = Path(__file__).resolve().parent.parent
-FOLDER = Path("out/benchmarks")
-"""Where finished trials are kept, in a folder for each benchmark."""
-_WORDS = ("failures", "notes")
-"""Of a trial, by row."""
+FOLDER = Path("out/benchmarks")  #: Where finished trials are kept, in a folder for each benchmark
+_WORDS = ("failures", "notes")  #: Of a trial, by row
 
 
 def settings_header() -> dict[str, str]:

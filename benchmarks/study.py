@@ -19,8 +19,7 @@ IDEAL, IMU = "ideal", "imu"
 """The state that the controller is given: the true one, or what its own sensors tell."""
 SENSED = "sensed-"  # What names on the robot's own sensors begin with
 BAR = re.compile(r"(<=|>=)? ?(-?\d[-\d.e]*(?= |$))? ?(.*)")  # Side, threshold and unit
-Rows = Sequence[tuple[str, str, str]]
-"""Name, quantity and bar."""
+Rows = Sequence[tuple[str, str, str]]  #: Name, quantity and bar
 
 
 class Direction(Enum):
@@ -156,10 +155,8 @@ class Study:
         return found.named(self._prefix)
 
 
-Results = dict[str, dict[int, TrialResult]]
-"""What every trial gave, by study and seed."""
-Task = tuple[Study, int]
-"""A study and the seed of one trial."""
+Results = dict[str, dict[int, TrialResult]]  #: What every trial gave, by study and seed
+Task = tuple[Study, int]  #: A study and the seed of one trial
 
 
 def chosen_studies(studies: Sequence[Study], names: Sequence[str]) -> tuple[Study, ...]:

@@ -60,8 +60,7 @@ TURN, TURN_TOLERANCE = math.pi / 2, 0.1
 """Angle that is turned to the left, and by which the true one may differ [rad]."""
 THROW, THROW_TIME = np.array([0.0, 600.0, 200.0]), 0.25
 """Force [N] ahead, left, up that throws a robot over, and for how long it does [s]."""
-DOWN_TIME = 2.5
-"""Time [s] after which one that was thrown is asked to recover."""
+DOWN_TIME = 2.5  #: Time [s] after which one that was thrown is asked to recover
 
 
 @dataclass(frozen=True, slots=True)

@@ -266,5 +266,4 @@ def viewer(name: str) -> Any:  # noqa: ANN401 - each makes something else of a r
 
 _ARRAYS = tuple(field.name for field in fields(Recording))[:8]
 """The fields that have a row for each sample."""
-_NOTED = ("multipliers", "gave_way")
-"""Those that may have one."""
+_NOTED = ("multipliers", "gave_way")  #: Those that may have one

@@ -158,8 +158,7 @@ EXEMPT |= {
 """What is made or asked in every tick is not checked there: what takes it refuses what is wrong."""
 EXEMPT_HUGE = {"go2_wbc.VelocityCommand", "go2_wbc.BodyPose"}
 """Where it is followed a velocity is clipped, with a warning, and a pose is refused."""
-LEGAL = {("go2-wbc new name", "nonsense")}
-"""What is not wrong at all."""
+LEGAL = {("go2-wbc new name", "nonsense")}  #: What is not wrong at all
 
 
 def _value(value: object) -> Callable[[], object]:

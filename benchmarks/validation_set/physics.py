@@ -29,16 +29,14 @@ from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 
-FRICTION = 0.5
-"""Friction coefficient of the floor: the one that the check counts on."""
+FRICTION = 0.5  #: Friction coefficient of the floor: the one that the check counts on
 NEAR, NEAR_SOLVED = 1.06, 1.13
 """Ratio of amplitudes, one done and one failed, at which the search ends."""
 STEP, STEP_SOLVED = 1.6, 1.25  # Ratio of amplitudes in the search for two that differ
 BORDER, PLAYS = "border", "plays"
 BORDERS_FILE = Path(__file__).parent / "borders.json"
 STRICT, STOPS, LENIENT = "strict", "stops", "lenient"
-LENIENT_OFF = 0.05
-"""Distance [m] that anything may be off what was written, leniently."""
+LENIENT_OFF = 0.05  #: Distance [m] that anything may be off what was written, leniently
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,7 @@ from go2_wbc.plant.terrain import Boxes, Terrain
 from go2_wbc.records import Array3
 from go2_wbc.world import DOUBTFUL, World
 
-Range = tuple[float, float]
-"""Least and greatest value; drawn evenly."""
+Range = tuple[float, float]  #: Least and greatest value; drawn evenly
 
 _FRICTION = sum(FRICTION_RANGE) / 2.0
 WORLD = World(

@@ -44,8 +44,7 @@ SIZES = {
 """What an observation may hold, and how many numbers; of a clock for each of its offsets."""
 LAYOUTS = ("frames", "terms")
 RANGES = ("forward", "lateral", "turning")
-RATES = 10.0, 500.0
-"""Least and greatest rate [Hz] of a policy."""
+RATES = 10.0, 500.0  #: Least and greatest rate [Hz] of a policy
 MOST_HISTORY = 100
 
 

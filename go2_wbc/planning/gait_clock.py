@@ -37,10 +37,8 @@ DUTY_FALL = 4.0
 is not put back. At 0.5 a push of 50 N s ahead threw a trot of 0.5 m/s over feet that stood on."""
 SEEN_STRIDE = Stride(reach=0.25, stance_min=0.25, stance_max=0.25, swing=0.25, swing_slope=0.0)
 """Of a trot on uneven ground that is seen."""
-Phases = tuple[float, float, float, float]
-"""At which the feet touch down, of FL, FR, RL and RR."""
-_RESOLUTION = 1e12
-"""Of phases, that adding and dividing may have blurred, in steps a turn."""
+Phases = tuple[float, float, float, float]  #: At which the feet touch down, of FL, FR, RL and RR
+_RESOLUTION = 1e12  #: Of phases, that adding and dividing may have blurred, in steps a turn
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,18 +32,15 @@ from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.records import Array3, Array3x3, ArrayNx3, Record
 from go2_wbc.robot.state import Snapshot
 
-CELL, CELLS = 0.025, 160
-"""Side of a cell [m], and how many cells the map is long and wide: 4 m."""
-_STRIDE = 2.0**20
-"""Between the names of two rows."""
+CELL, CELLS = 0.025, 160  #: Side of a cell [m], and how many cells the map is long and wide: 4 m
+_STRIDE = 2.0**20  #: Between the names of two rows
 LAYER, JUMP, DOWNS = 0.05, 0.05, 4
 """Depth [m] of the points that count, height [m] beyond which a cell has jumped, and the scans in
 a row after which a jump down is believed."""
 DRIFT = 1.6e-5
 """Variance [m^2] that a scan adds before it is taken in: 4 mm of the height that the robot believes
 to have, so that newer scans carry the map along."""
-LEAST_VARIANCE = 1e-6
-"""Of a scan's point [m^2]: 1 mm."""
+LEAST_VARIANCE = 1e-6  #: Of a scan's point [m^2]: 1 mm
 REACH, TALLEST = 1.9, 0.5
 """Distance [m] ahead and aside, and height [m] over the base, beyond which a point is left out: the
 map reaches no farther, and what is higher is no ground."""

@@ -37,12 +37,9 @@ from go2_wbc.compilation import subroutine
 from go2_wbc.records import Record
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, Retired, ranged, retires
 
-NODES = 12
-"""Nodes of the horizon."""
-STEP = 0.03
-"""Length [s] of a node."""
-INTERVAL = 0.01
-"""Time [s] from one solution to the next."""
+NODES = 12  #: Nodes of the horizon
+STEP = 0.03  #: Length [s] of a node
+INTERVAL = 0.01  #: Time [s] from one solution to the next
 
 
 @typed()

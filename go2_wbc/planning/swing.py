@@ -39,8 +39,7 @@ from go2_wbc.planning.ground import Ground, RoughConfig, apex_raise, delay, is_r
 from go2_wbc.records import Array3, Record
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
-EARLIEST = 0.7
-"""Share of the swing from which on a contact may be a landing."""
+EARLIEST = 0.7  #: Share of the swing from which on a contact may be a landing
 STEP = 0.015
 """Height [m] above the ground from which on it is one. Both are from a search in simulation."""
 

@@ -43,8 +43,7 @@ from go2_wbc.reference import Target
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
-RATE = 2.0
-"""Share of the remaining error that is added per second [1/s]."""
+RATE = 2.0  #: Share of the remaining error that is added per second [1/s]
 POSITION_LIMIT, POSITION_WINDOW = 0.06, 0.04
 """Greatest correction [m] per axis, and the error [m] beyond which one counts as this."""
 ANGLE_LIMIT, ANGLE_WINDOW = 0.3, 0.3
@@ -60,10 +59,8 @@ STRIDE_RATE, STRIDE_WINDOW = 1.0, 0.05
 believed 2 cm beside their place, as gravity is known to 1 deg, leaned a trot by 4 deg. A robot that
 stands ready does it as a motion does: the joints' friction leaves 2.5 deg of a pose undone, and a
 payload that reaches farther than is believed leans it by 4 deg."""
-LEAN_LIMIT = 0.15
-"""Greatest lean [rad] that is taken out."""
-_TINY = 1e-9
-"""Velocity [m/s] that stands in for none where one divides by it."""
+LEAN_LIMIT = 0.15  #: Greatest lean [rad] that is taken out
+_TINY = 1e-9  #: Velocity [m/s] that stands in for none where one divides by it
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +83,7 @@ class BodyPose:
         return np.array([self.height, self.roll, self.pitch, self.yaw])
 
 
-LEVEL = BodyPose()
-"""The pose of a robot that walks and is asked for nothing else."""
+LEVEL = BodyPose()  #: The pose of a robot that walks and is asked for nothing else
 
 
 @typed()

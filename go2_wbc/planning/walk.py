@@ -24,8 +24,7 @@ from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Retired, past_table, ranged, retires
 
-LEAST_HEIGHT, GREATEST_HEIGHT = 0.18, 0.34
-"""CoM heights [m] between which the legs can step."""
+LEAST_HEIGHT, GREATEST_HEIGHT = 0.18, 0.34  #: CoM heights [m] between which the legs can step
 
 
 @typed()

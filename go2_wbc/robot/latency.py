@@ -31,20 +31,16 @@ from go2_wbc.records import Record
 from go2_wbc.robot.state import RobotState
 from go2_wbc.robot.state_filter import turn
 
-LAGS = 11
-"""Control periods by which a command may be late, none included: up to 20 ms at 500 Hz."""
+LAGS = 11  #: Control periods by which a command may be late, none included: up to 20 ms at 500 Hz
 MEMORY = 0.8
 """Time [s] over which misfits are averaged. Where commands act 0 to 18 ms late, drawn anew every 20
 ms, the lag found with 0.2 s went from 4 to 14 ms and back, and 3 of 5 robots fell in reversals of 2
 m/s; with this it stays in the middle, and none did."""
-BETTER = 0.01
-"""Share of the torques' own change by which another lag must fit better."""
-READ = 1.0
-"""Lag that is none of the commands: by so much readings may be old."""
+BETTER = 0.01  #: Share of the torques' own change by which another lag must fit better
+READ = 1.0  #: Lag that is none of the commands: by so much readings may be old
 WORST_FIT = 0.5
 """Share of that change up to which a lag may be off: motors that do not obey tell of none."""
-LEAST_CHANGE = 1e-3
-"""Mean square [N^2 m^2] of that change below which it says nothing."""
+LEAST_CHANGE = 1e-3  #: Mean square [N^2 m^2] of that change below which it says nothing
 
 
 class Lag(Record):

@@ -22,8 +22,7 @@ _SMOOTHING = 0.05
 _FLIGHT, _ARM = 0.5, 0.1
 """Share of gravity that a trunk feels at least if something carries it, while in flight it feels
 none; and the greatest distance [m] of the CoM from the IMU, by which one that turns feels w^2 r."""
-KNOWN, TUMBLED, LOST = range(3)
-"""Whether an estimate holds, or has to begin anew."""
+KNOWN, TUMBLED, LOST = range(3)  #: Whether an estimate holds, or has to begin anew
 _UPRIGHT = np.cos(np.radians(15.0))
 """Cosine of the angle between the accelerometer's up and the estimate's, at rest, if it is lost."""
 _OVER, _CALM = np.cos(np.radians(50.0)), 1.0

@@ -49,13 +49,11 @@ JUMP = 0.05
 """rad; a joint's angle differs by less from what its speed says, however hard the foot lands."""
 LONGEST_STEP, USUAL_STEP = 0.05, 0.002
 """Time [s] between two readings of one stretch, and that taken for the first one's."""
-DOUBT = 0.01
-"""Time [s] after which a joint that reads the very same says nothing of the IMU."""
+DOUBT = 0.01  #: Time [s] after which a joint that reads the very same says nothing of the IMU
 STUCK_TIME = 0.1
 """An encoder is stuck if it has read the very same for so long [s], while its leg's others have
 changed: noise alone lets none stay for more than 8 ms, not even at rest."""
-SMOOTHING = 0.008
-"""Time constant [s] of the joints' accelerations."""
+SMOOTHING = 0.008  #: Time constant [s] of the joints' accelerations
 LOADED, FREE = 20.0, 10.0
 """Force [N] by a leg's torques above which its foot stands; 99 % that swing bear less than 7."""
 LANDED = 0.03
@@ -71,15 +69,13 @@ NOISY, MOST_NOISE, NOISE_TIME = 1.5, 4.0, 0.2
 """Mean of |f - 2 f_1 + f_2|, up to so much [N], over this time [s], above which a sensor has noise:
 its own is 2.6. While such a one changes it lives, whatever its leg bears: a calf may lie on a box.
 Others say the same while the load stays: they are judged once that changes."""
-CHANGED = 15.0
-"""By so much [N]."""
+CHANGED = 15.0  #: By so much [N]
 RUBBING = 2.0
 """N m s/rad; joints damped so, as in MuJoCo Menagerie's Go2, may not be taken for loads."""
 CARRIED, UPRIGHT = 0.7, 0.9
 """Share of the robot's weight that its legs bear while it stands or walks, and the cosine of its
 greatest tilt then: legs of one that lies or tumbles strike what they do not stand on."""
-STANDING = np.tile([0.0, 0.8, -1.6], 4)
-"""Joint angles [rad] of a robot that stands, roughly."""
+STANDING = np.tile([0.0, 0.8, -1.6], 4)  #: Joint angles [rad] of a robot that stands, roughly
 
 
 class WatchedSensors(Record):

@@ -15,8 +15,7 @@ from go2_wbc.compilation import subroutine
 from go2_wbc.records import Array3, Array12, Record
 from go2_wbc.robot.state import SensorReading
 
-MEASURING = 0.2
-"""Time [s] over which the squares of e are averaged."""
+MEASURING = 0.2  #: Time [s] over which the squares of e are averaged
 NOISY_JOINTS, NOISY_GYRO = 0.8, 0.2
 """Root of that mean [rad/s] from which on they are noisy: of sound sensors, while late commands let
 the robot land hard, it was 0.24 and 0.04 at most."""

@@ -15,16 +15,11 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand
 
-CONTROL_PERIOD = 0.004
-"""Seconds; twice the usual one: a drop takes half the time."""
-HEIGHT = 0.5
-"""Height [m] of the base at the start; no leg reaches the ground."""
-GREATEST_SPIN = 3.0
-"""Greatest angular velocity [rad/s] per axis at the start."""
-SETTLE_TIME = 1.5
-"""Time [s] for which the limp robot falls and comes to rest."""
-UPRIGHT = np.radians(6)
-"""Tilt [rad] below which a robot that stands is upright."""
+CONTROL_PERIOD = 0.004  #: Seconds; twice the usual one: a drop takes half the time
+HEIGHT = 0.5  #: Height [m] of the base at the start; no leg reaches the ground
+GREATEST_SPIN = 3.0  #: Greatest angular velocity [rad/s] per axis at the start
+SETTLE_TIME = 1.5  #: Time [s] for which the limp robot falls and comes to rest
+UPRIGHT = np.radians(6)  #: Tilt [rad] below which a robot that stands is upright
 
 
 @dataclass(frozen=True, slots=True)
