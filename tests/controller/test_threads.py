@@ -30,10 +30,8 @@ from tests.controller.plants import (
     is_limp,
 )
 
-# s into a call, when it is well under way.
-UNDER_WAY = 0.1
-# m/s
-SLOW = 0.3
+UNDER_WAY = 0.1  # s into a call, when it is well under way
+SLOW = 0.3  # m/s
 
 Do = Callable[[GO2Controller], object]
 

@@ -21,10 +21,8 @@ FOOT_RADIUS = find_profile().foot_radius
 # m; how closely few points can stand for the mesh of the trunk.
 POINT_TOLERANCE = 0.01
 TICK = 0.01
-# rad; the foot is 89 mm below the hip.
-FOLDED_LEG = (0.0, 1.36, -2.72)
-# rad; 20 mm more below the trunk.
-NEARLY_FOLDED_LEG = (0.0, 1.31, -2.64)
+FOLDED_LEG = (0.0, 1.36, -2.72)  # rad; the foot is 89 mm below the hip
+NEARLY_FOLDED_LEG = (0.0, 1.31, -2.64)  # rad; 20 mm more below the trunk
 
 
 MODEL = RobotModel()

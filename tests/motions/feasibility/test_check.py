@@ -36,8 +36,7 @@ from tests.motions.doctored import (
 
 STAND_HEIGHT = find_profile().stand_height
 
-# m, N, N m; of quantities that two ways of calculating give, one of them by a spline.
-EXACT = 1e-6
+EXACT = 1e-6  # m, N, N m; of quantities that two ways of calculating give, one of them by a spline
 
 
 @pytest.fixture(scope="module")
