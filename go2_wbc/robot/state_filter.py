@@ -65,12 +65,19 @@ Covariance = Float[np.ndarray, "27 27"]
 
 
 class Filter(Record):
-    """The filter between two ticks, and what a tick works with."""
+    """The filter between two ticks, and what a tick works with.
 
-    x: Estimate  #: the state
-    P: Covariance  #: covariance of its error
-    error: Float[np.ndarray, "27"]  #: as found so far in this tick
-    column: Float[np.ndarray, "27"]  #: work space, P h'
+    Attributes:
+        x: the state.
+        P: covariance of its error.
+        error: as found so far in this tick.
+        column: work space, P h'.
+    """
+
+    x: Estimate
+    P: Covariance
+    error: Float[np.ndarray, "27"]
+    column: Float[np.ndarray, "27"]
 
 
 @subroutine
