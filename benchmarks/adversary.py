@@ -116,22 +116,22 @@ def measure(trial: Trial, found: TrialResult, family: str) -> None:
 
 
 def passed(
-    family: str, numbers: Sequence[float] | Float[np.ndarray, " k"], least: float = STATED
+    family: str, numbers: Sequence[float] | Float[np.ndarray, " k"]
 ) -> tuple[float, MotionPlan] | None:
-    """Chance and plan of a motion that the check passes at a chance of ``least`` or more."""
+    """Chance and plan of a motion that the check passes at a chance of ``STATED`` or more."""
     try:
         line = FAMILIES[family](Numbers(np.asarray(numbers).tolist()))
         plan = checker().plan(line, check=False)
         report = checker().check(plan)
     except MotionError:
         return None
-    return (report.probability, plan) if report.ok and report.probability >= least else None
+    return (report.probability, plan) if report.ok and report.probability >= STATED else None
 
 
-def outcome(plan: MotionPlan, seed: int = 0) -> tuple[tuple[str, ...], float]:
+def outcome(plan: MotionPlan) -> tuple[tuple[str, ...], float]:
     """What went wrong with a plan that was played, and the greatest share of what is allowed."""
     try:
-        run = play(plan, checker().model, seed)
+        run = play(plan, checker().model, 0)
     except TrialFailed as error:
         return (str(error),), FAILED
     return failures_of(run, plan), _worst(run, plan)

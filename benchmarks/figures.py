@@ -1,7 +1,5 @@
 """Figures of the evidence: how exactly a speed is followed, how often what was stated came true."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Good values for what is public, beside which ``test_bad_inputs`` tries a bad one."""
 
-from __future__ import annotations
-
 import importlib
 import tempfile
 from collections.abc import Callable

@@ -8,8 +8,6 @@ own that says what was wrong, or in a warning; on the command line with the exit
 usage. It runs without the checks of types that the tests have, since users have none.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import dataclasses
