@@ -284,10 +284,15 @@ class Reference:
 
 @dataclass(frozen=True, slots=True)
 class Anchor:
-    """Where a motion takes place: its frame has z up, x ahead, and its origin on the ground."""
+    """Where a motion takes place: its frame has z up, x ahead, and its origin on the ground.
 
-    p_world: Float[np.ndarray, "3"]  #: the origin: the middle of the feet on the ground [m]
-    yaw: float  #: heading of the feet [rad]
+    Attributes:
+        p_world: the origin: the middle of the feet on the ground [m].
+        yaw: heading of the feet [rad].
+    """
+
+    p_world: Float[np.ndarray, "3"]
+    yaw: float
 
     @property
     def pose(self) -> tuple[float, float, float]:

@@ -43,11 +43,17 @@ class TrialFailed(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """The conditions that a seed stands for."""
+    """The conditions that a seed stands for.
 
-    seed: int  #: of every random number of the trial
-    has_nominal_friction: bool = False  #: keep the friction at ``NOMINAL_FRICTION``, as for pushes
-    sensors: str = "ideal"  #: of the plant: what the controller is given of the state
+    Attributes:
+        seed: of every random number of the trial.
+        has_nominal_friction: keep the friction at ``NOMINAL_FRICTION``, as for pushes.
+        sensors: of the plant: what the controller is given of the state.
+    """
+
+    seed: int
+    has_nominal_friction: bool = False
+    sensors: str = "ideal"
 
     @property
     def friction(self) -> float:

@@ -82,10 +82,14 @@ def solve(
 
 @dataclass(frozen=True, slots=True)
 class Solved:
-    """A problem and its plan, from which the search for another of the same phases may begin."""
+    """A problem and its plan, from which the search for another of the same phases may begin.
 
-    problem: PhaseProblem  #: what was asked
-    plan: DynamicTrajectory  #: what was found
+    Attributes:
+        problem, plan: what was asked, and what was found.
+    """
+
+    problem: PhaseProblem
+    plan: DynamicTrajectory
 
 
 def continued(

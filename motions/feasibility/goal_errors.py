@@ -76,17 +76,25 @@ def _of_written(span: DynamicSpan, places: _Places, model: RobotModel) -> Misses
 
 @dataclass(frozen=True, slots=True)
 class Departure:
-    """Of one part of a motion, which could not be done as it was written."""
+    """Of one part of a motion, which could not be done as it was written.
 
-    start: float  #: from when on [s] of the motion
-    end: float  #: until when [s]
+    Attributes:
+        start, end: when [s] of the motion.
+        place: greatest distance [m] of the trunk, or of a foot that lands, from what was written.
+        subject: of what.
+        place_time: when [s].
+        angle, angle_time: greatest angle [rad] of the trunk from what was written, and when [s].
+        lag: how late [s] the trunk is as a whole; below 0, early.
+    """
+
+    start: float
+    end: float
     place: float
-    """Greatest distance [m] of the trunk, or of a foot that lands, from what was written."""
-    subject: str  #: of what
-    place_time: float  #: when [s]
-    angle: float  #: greatest angle [rad] of the trunk from what was written
-    angle_time: float  #: when [s]
-    lag: float  #: how late [s] the trunk is as a whole; below 0, early
+    subject: str
+    place_time: float
+    angle: float
+    angle_time: float
+    lag: float
 
     def __str__(self) -> str:
         """Two lines for a person, at most 80 columns wide."""
