@@ -26,10 +26,8 @@ from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker
 
 PLAYS = 20  # Of a search
-STATED = 0.95
-"""Chance from which on a pass counts."""
-FIRST = 9000
-"""First seed that judges: whoever mends the check looks at lower ones only."""
+STATED = 0.95  #: Chance from which on a pass counts
+FIRST = 9000  #: First seed that judges: whoever mends the check looks at lower ones only
 MOST_CHECKS, HALVINGS = 60, 3
 """Changes that are tried for one play, and how often one that is refused is halved."""
 CHANGED, WIDEST, NARROWEST = 0.3, 0.3, 0.03
@@ -48,19 +46,12 @@ ROWS = (
 
 @dataclass(slots=True)
 class Attempt:
-    """A motion that was passed, and what came of it.
+    """A motion that was passed, and what came of it."""
 
-    Attributes:
-        numbers: that it was written by.
-        chance: that was stated.
-        harm: what went wrong, in words; empty if it was done.
-        worst: the greatest share of what is allowed.
-    """
-
-    numbers: Float[np.ndarray, " k"]
-    chance: float
-    harm: tuple[str, ...] = ()
-    worst: float = 0.0
+    numbers: Float[np.ndarray, " k"]  #: that it was written by
+    chance: float  #: that was stated
+    harm: tuple[str, ...] = ()  #: what went wrong, in words; empty if it was done
+    worst: float = 0.0  #: the greatest share of what is allowed
 
     @property
     def score(self) -> float:
@@ -125,22 +116,22 @@ def measure(trial: Trial, found: TrialResult, family: str) -> None:
 
 
 def passed(
-    family: str, numbers: Sequence[float] | Float[np.ndarray, " k"], least: float = STATED
+    family: str, numbers: Sequence[float] | Float[np.ndarray, " k"]
 ) -> tuple[float, MotionPlan] | None:
-    """Chance and plan of a motion that the check passes at a chance of ``least`` or more."""
+    """Chance and plan of a motion that the check passes at a chance of ``STATED`` or more."""
     try:
         line = FAMILIES[family](Numbers(np.asarray(numbers).tolist()))
         plan = checker().plan(line, check=False)
         report = checker().check(plan)
     except MotionError:
         return None
-    return (report.probability, plan) if report.ok and report.probability >= least else None
+    return (report.probability, plan) if report.ok and report.probability >= STATED else None
 
 
-def outcome(plan: MotionPlan, seed: int = 0) -> tuple[tuple[str, ...], float]:
+def outcome(plan: MotionPlan) -> tuple[tuple[str, ...], float]:
     """What went wrong with a plan that was played, and the greatest share of what is allowed."""
     try:
-        run = play(plan, checker().model, seed)
+        run = play(plan, checker().model, 0)
     except TrialFailed as error:
         return (str(error),), FAILED
     return failures_of(run, plan), _worst(run, plan)

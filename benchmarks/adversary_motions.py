@@ -12,8 +12,7 @@ from go2_wbc.legs import LEGS
 from motions import Timeline, deg
 
 _Item = TypeVar("_Item")
-COUNT = 40
-"""Numbers of a motion; more than any family reads."""
+COUNT = 40  #: Numbers of a motion; more than any family reads
 _NAMES = tuple(leg.name for leg in LEGS)
 _TRUNK = {"z": 0.07, "roll": deg(32.0), "pitch": deg(25.0), "yaw": deg(28.0)}
 _PLACE = {"x": 0.07, "y": 0.06}

@@ -38,8 +38,7 @@ FIRST_SEED = 64000
 """Seed of the first trial that is judged, but of disturbed runs, which have their own."""
 ASIDE, AHEAD = 36.0, 45.0  # Impulses [N s] on the standing robot
 DIRECTIONS, PHASES = 8, 16
-STANDING_LIMIT = 3.0
-"""Time [s] after a push in which the robot must stand again."""
+STANDING_LIMIT = 3.0  #: Time [s] after a push in which the robot must stand again
 LOOK = 0.05  # Time [s] between two looks at the robot
 CALM = 0.2  # Time [s] for which it must stand
 TROT_PUSHES = {"lateral": (math.pi / 2, 26.0), "forward": (0.0, 50.0), "backward": (math.pi, 42.0)}
@@ -47,10 +46,8 @@ TROT_PUSHES = {"lateral": (math.pi / 2, 26.0), "forward": (0.0, 50.0), "backward
 TROT_SPEED, SPEED_TOLERANCE, TROT_TIME = 0.5, 0.15, 2.0
 """m/s, m/s, and the time [s] after a push within which it trots again."""
 DROP_FRICTION = (0.4, 1.0)
-DROP_HEIGHT = (0.1, 0.5)
-"""Height [m] of the lowest point of the robot over the floor."""
-DROP_TIME = 1.0
-"""Time [s] for which the limp robot falls before ``recover()``."""
+DROP_HEIGHT = (0.1, 0.5)  #: Height [m] of the lowest point of the robot over the floor
+DROP_TIME = 1.0  #: Time [s] for which the limp robot falls before ``recover()``
 GENTLE = VelocityEnvelope(forward=1.2, backward=1.2, lateral=0.5, turning=1.5)
 """Of the trot's changes; those of the other gaits are in proportion."""
 CHANGES = 10

@@ -25,8 +25,7 @@ MOTIONS = 120
 RANDOM, BESIDE = "random", "border"
 SMALLEST, LARGEST, STEP, NEAR = 0.15, 2.5, 1.5, 1.1
 """Sizes between which a border is looked for, ratio of those that are tried, and at the end."""
-BELOW, ABOVE = (0.8, 0.95), (1.05, 1.25)
-"""Sizes of the two motions beside a border, over its own."""
+BELOW, ABOVE = (0.8, 0.95), (1.05, 1.25)  #: Sizes of the two motions beside a border, over its own
 ERROR = "calibration error"
 BARS = {ERROR: 0.05, "random": 0.95, "border": 0.85, "refused": 0.7}
 """Greatest error; least shares of passes that are done, and of refusals at the border that fail."""

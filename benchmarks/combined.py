@@ -37,20 +37,14 @@ from go2_wbc.plant.terrain import Boxes
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion
 
-FIRST_SEED = 1100
-"""Seed of the first trial that is judged."""
-SPEEDS, TIMES = (0.3, 0.5, 0.8, 1.2), (2.0, 5.0, 8.0, 12.0)
-"""m/s and s."""
-AT_REST, WATCHED = 0.02, 2.0
-"""Speed [m/s] of the CoM at rest, and for how long it is watched [s]."""
+FIRST_SEED = 1100  #: Seed of the first trial that is judged
+SPEEDS, TIMES = (0.3, 0.5, 0.8, 1.2), (2.0, 5.0, 8.0, 12.0)  #: m/s and s
+AT_REST, WATCHED = 0.02, 2.0  #: Speed [m/s] of the CoM at rest, and for how long it is watched [s]
 CALLS: tuple[str, ...] = ("stop", "stays", "high-five", "turn-left", "sit")
 DELAYS, FRICTIONS = (0.0, 0.004, 0.008, 0.01, 0.014), (0.2, 0.3, 0.4, 0.6)
-LOADS, WALKS = (0.0, 4.0), (0.5, 1.0)
-"""kg and m/s."""
-LATEST = 0.01
-"""Delay [s] up to which a row has a bar."""
-WALK_TIME, CURVE_TIME = 10.0, 20.0
-"""s"""
+LOADS, WALKS = (0.0, 4.0), (0.5, 1.0)  #: kg and m/s
+LATEST = 0.01  #: Delay [s] up to which a row has a bar
+WALK_TIME, CURVE_TIME = 10.0, 20.0  #: s
 CIRCLES, FULL_AFTER, FIVES = 600.0, 300.0, 200
 """s, time [s] after which the recording is full, and how many high fives."""
 RESTING = (
@@ -190,8 +184,7 @@ _ALL = (
         group="combined",
     ),
 )
-STUDIES = (*_ALL, *(study.sensed(study.group) for study in _ALL))
-"""In the order of the report."""
+STUDIES = (*_ALL, *(study.sensed(study.group) for study in _ALL))  #: In the order of the report
 
 BENCHMARK = Benchmark(
     "combined",

@@ -63,27 +63,17 @@ class Seeded:
 
 @dataclass(frozen=True, slots=True)
 class Benchmark:
-    """A command that runs studies; ``run`` is that of its module.
+    """A command that runs studies; ``run`` is that of its module."""
 
-    Attributes:
-        name: what the command line takes.
-        description: of its help; the exit code is told besides.
-        studies: in the order of the report.
-        takes: how long it takes, for the help.
-        examples: arguments, for the help, besides those that all have.
-        sensors: whether they can be chosen.
-        runs: how often a study that draws nothing is run, one after the other; 0 for seeds.
-        needs: by group, what raises ``MissingDependency`` if it cannot be run.
-    """
-
-    name: str
-    description: str
-    studies: Sequence[Study]
-    takes: str = ""
-    examples: tuple[str, ...] = ()
-    sensors: bool = False
-    runs: int = 0
+    name: str  #: what the command line takes
+    description: str  #: of its help; the exit code is told besides
+    studies: Sequence[Study]  #: in the order of the report
+    takes: str = ""  #: how long it takes, for the help
+    examples: tuple[str, ...] = ()  #: arguments, for the help, besides those that all have
+    sensors: bool = False  #: whether they can be chosen
+    runs: int = 0  #: how often a study that draws nothing is run, one after the other; 0 for seeds
     needs: Mapping[str, Callable[[], None]] = field(default_factory=dict)
+    """By group, what raises ``MissingDependency`` if it cannot be run."""
 
     @property
     def run(self) -> Callable[..., int]:

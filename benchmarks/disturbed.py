@@ -29,8 +29,7 @@ FIRST_SEED = 104000
 CALLS = 5
 CALLED = ("stand", "sit", "lie_down", "high_five", "walk", "walk", "play", "turn", "recover")
 MOTIONS = ("bow", "wave", "push_ups", "march", "rear_up", "jump_up", "bunny_hops")
-RECOVERIES = 3
-"""How often in a row the robot may try to get up under pushes."""
+RECOVERIES = 3  #: How often in a row the robot may try to get up under pushes
 HARDEST = 90.0  # Greatest impulse [N s] of a push on the level
 LIFTING = (-0.5, 1.0)
 """Range of the upward impulse of the others, over their greatest one on the level."""
@@ -40,27 +39,19 @@ RISEN = 0.2
 """Height [m] of the base over the lowest foot from which on a trunk has left the ground."""
 LEAST_FEET, STOOD = 2, 0.2
 """Feet on the ground and time [s] by which it has not just been lifted by a push."""
-STUMBLE = 0.05
-"""Time [s] for which a trunk may touch the ground without having fallen."""
+STUMBLE = 0.05  #: Time [s] for which a trunk may touch the ground without having fallen
 NOTICED = 0.2  # Time [s] in which a fall must be noticed
 DOWN = (Mode.FALLEN, Mode.DAMPED)
 
 
 @dataclass(frozen=True, slots=True)
 class Fall:
-    """One fall.
+    """One fall."""
 
-    Attributes:
-        time: of the fall in truth, or of the mode that said so before [s].
-        delay: from the fall to the mode that says so [s]; infinite if none did.
-        mode: what the robot was said to do.
-        call: what it was asked to do.
-    """
-
-    time: float
-    delay: float
-    mode: Mode
-    call: str
+    time: float  #: of the fall in truth, or of the mode that said so before [s]
+    delay: float  #: from the fall to the mode that says so [s]; infinite if none did
+    mode: Mode  #: what the robot was said to do
+    call: str  #: what it was asked to do
 
     def __str__(self) -> str:
         """In one line, for the notes."""

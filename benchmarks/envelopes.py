@@ -31,14 +31,11 @@ from go2_wbc.planning.envelopes import FILE
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.robot.model import RobotModel
 
-FIRST_SEED = 5200
-"""Of those that measure an envelope; nothing is judged by them."""
+FIRST_SEED = 5200  #: Of those that measure an envelope; nothing is judged by them
 SEEDS = 4
 ERROR, SATURATED = 0.05, 0.05  # Share of the command, and of the ticks
-LEAST_ERROR = 0.02
-"""m/s, rad/s; an error below it is none, however slow the command."""
-LEAD, WINDOW = 1.0, 2.0
-"""Time [s] after the ramp that is left out, and that is measured."""
+LEAST_ERROR = 0.02  #: m/s, rad/s; an error below it is none, however slow the command
+LEAD, WINDOW = 1.0, 2.0  #: Time [s] after the ramp that is left out, and that is measured
 WAYS = {
     "forward": np.array([1.0, 0.0, 0.0]),
     "backward": np.array([-1.0, 0.0, 0.0]),

@@ -24,8 +24,7 @@ from viz.style import ACCENT, MUTED, TIGHT, save_figure
 MARK, END = "<!-- evidence:", "<!-- evidence:end -->"
 """What stands above a table, with its name, and below it."""
 TABLES = Path(__file__).with_suffix(".json")
-SPEEDS = ("0.5", "1.0", "1.5", "2.0", "2.5", "3.0", "3.5")
-"""Of the trot [m/s], in the figure."""
+SPEEDS = ("0.5", "1.0", "1.5", "2.0", "2.5", "3.0", "3.5")  #: Of the trot [m/s], in the figure
 STATES = (("true state", ACCENT), ("own sensors", TIGHT))
 PEER = {0.5: 7.0, 0.8: 9.5, 1.0: 12.0}
 """Mean error [%] of go2-convex-mpc over its speed [m/s], on the true state (measured 2026-11)."""
@@ -34,27 +33,19 @@ PANELS = (
     ("mae", "mean absolute error, m/s", False),
     ("saturated", "ticks with a motor at all it has, %", False),
 )
-Row = Mapping[str, Any]
-"""A row of a benchmark's JSON."""
+Row = Mapping[str, Any]  #: A row of a benchmark's JSON
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line of a table.
-
-    Attributes:
-        metrics: whose values it shows, one or two; empty where one of two states has none.
-        what: in words.
-        shown: how a value is printed.
-        peer: a value to compare it with.
-        bar: of a line of two metrics, what is asked for.
-    """
+    """A line of a table."""
 
     metrics: tuple[str, ...]
-    what: str
-    shown: str
-    peer: str = ""
-    bar: str = ""
+    """Whose values it shows, one or two; empty where one of two states has none."""
+    what: str  #: in words
+    shown: str  #: how a value is printed
+    peer: str = ""  #: a value to compare it with
+    bar: str = ""  #: of a line of two metrics, what is asked for
 
     def text(self, rows: Mapping[str, Row]) -> str:
         """The line, from the results by metric.

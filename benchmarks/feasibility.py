@@ -43,12 +43,10 @@ from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker
 
 EXAM, DYNAMIC, REFUSED = "exam", "dynamic", "refused"
-THRESHOLD = 0.95
-"""Least precision and recall of refusals and of passes, test half, strict outcome."""
+THRESHOLD = 0.95  #: Least precision and recall of refusals and of passes, test half, strict outcome
 BORDER_PRECISION, BORDER_RECALL = 0.85, 0.90
 """The same of refusals among the motions at the border."""
-LEAST_DYNAMIC = 100
-"""Dynamic motions of the test half that are judged, at least."""
+LEAST_DYNAMIC = 100  #: Dynamic motions of the test half that are judged, at least
 OUTCOMES = (STRICT, STOPS, LENIENT, FELL)
 _BETWEEN = "; "
 

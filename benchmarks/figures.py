@@ -1,7 +1,5 @@
 """Figures of the evidence: how exactly a speed is followed, how often what was stated came true."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,21 +16,14 @@ _PANEL_SIZE, _DIAGRAM_SIZE = (3.0, 2.8), (4.6, 4.0)  # [inch]
 
 @dataclass(frozen=True, slots=True)
 class SpeedLine:
-    """One line of a panel.
+    """One line of a panel."""
 
-    Attributes:
-        label: for the legend.
-        color: as ``#rrggbb``.
-        speeds: told [m/s].
-        values: mean over the runs.
-        worst: of the runs, up to which a bar is drawn; nan where there is none.
-    """
-
-    label: str
-    color: str
-    speeds: Float[np.ndarray, " n"]
-    values: Float[np.ndarray, " n"]
+    label: str  #: for the legend
+    color: str  #: as ``#rrggbb``
+    speeds: Float[np.ndarray, " n"]  #: told [m/s]
+    values: Float[np.ndarray, " n"]  #: mean over the runs
     worst: Float[np.ndarray, " n"]
+    """Of the runs, up to which a bar is drawn; nan where there is none."""
 
 
 @dataclass(frozen=True, slots=True)

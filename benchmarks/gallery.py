@@ -46,8 +46,7 @@ SHEET_QUALITY = 60  # Of WebP: 0 to 100
 SIZE_LIMIT = 400_000  # Largest loop [bytes]
 FILM_SPEED, FILM_RATE = 2.0, 10.0
 """Seconds of the run in a second of the film, and pictures in a second of it."""
-LEAD = 0.6
-"""How long [s] the robot stands in the film before its first step."""
+LEAD = 0.6  #: How long [s] the robot stands in the film before its first step
 _STILL = 1e6  # [s] a path that is smoothed over so long is its mean
 FILM_STYLE = ShotStyle(
     size=(640, 400),

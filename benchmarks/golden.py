@@ -32,19 +32,12 @@ RECORD, COMPARE = "record", "compare"
 
 @dataclass(frozen=True, slots=True)
 class Stored:
-    """A recorded run.
+    """A recorded run."""
 
-    Attributes:
-        digests: of each tick, by stage.
-        sizes: of each kept tick, how many numbers each stage has.
-        numbers: of the kept ticks, one stage after the other.
-        lines: what came of its calls.
-    """
-
-    digests: UInt64[np.ndarray, "ticks stages"]
-    sizes: Int[np.ndarray, "kept stages"]
-    numbers: Float[np.ndarray, " n"]
-    lines: list[str]
+    digests: UInt64[np.ndarray, "ticks stages"]  #: of each tick, by stage
+    sizes: Int[np.ndarray, "kept stages"]  #: of each kept tick, how many numbers each stage has
+    numbers: Float[np.ndarray, " n"]  #: of the kept ticks, one stage after the other
+    lines: list[str]  #: what came of its calls
 
     @staticmethod
     def of(ledger: Ledger) -> Stored:

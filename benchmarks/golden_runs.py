@@ -53,26 +53,20 @@ STAGES: dict[str, tuple[str, ...]] = {
 }
 """What a tick makes, in its order, and the fields that are looked at; a report has its own."""
 
-Values = Mapping[str, Float[np.ndarray, " n"]]
-"""Numbers of one stage, by their names."""
+Values = Mapping[str, Float[np.ndarray, " n"]]  #: Numbers of one stage, by their names
 Step = Callable[[GO2Controller], object]
 
 
 @dataclass
 class Ledger:
-    """What a run has made.
+    """What a run has made."""
 
-    Attributes:
-        folder: where the run may keep what it reads.
-        digests: of every tick, by stage; 0 where the stage did nothing.
-        kept: numbers of every ``KEPT_EVERY``-th tick, stage by stage.
-        lines: what came of its calls.
-    """
-
-    folder: Path
+    folder: Path  #: where the run may keep what it reads
     digests: list[list[int]] = field(default_factory=list)
+    """Of every tick, by stage; 0 where the stage did nothing."""
     kept: list[list[Values]] = field(default_factory=list)
-    lines: list[str] = field(default_factory=list)
+    """Numbers of every ``KEPT_EVERY``-th tick, stage by stage."""
+    lines: list[str] = field(default_factory=list)  #: what came of its calls
 
     def tick(self, made: Mapping[str, object]) -> None:
         """Take note of what each stage made: values, or what has the fields of ``STAGES``."""
@@ -132,17 +126,11 @@ def noted(ledger: Ledger) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class RobotRun:
-    """A robot that takes steps, one after the other.
+    """A robot that takes steps, one after the other."""
 
-    Attributes:
-        steps: calls of the controller.
-        plant: makes the robot.
-        config: of the controller.
-    """
-
-    steps: tuple[Step, ...]
-    plant: Callable[[], MujocoPlant] = MujocoPlant
-    config: Config | None = None
+    steps: tuple[Step, ...]  #: calls of the controller
+    plant: Callable[[], MujocoPlant] = MujocoPlant  #: makes the robot
+    config: Config | None = None  #: of the controller
 
     def __call__(self, ledger: Ledger) -> None:
         """Take the steps; what each came to is a line."""

@@ -31,12 +31,9 @@ HELD_ROWS = (
     ("joints", "least joint distance, held", ">= 0.03 rad"),
     ("joints_phase", "the same, on three legs", ">= rad"),
 )
-RAISED = 0.5
-"""Height [m] of the paw from which on it counts as raised; it is held at 0.6 m."""
-SETTLE_TIME = 1.5
-"""Time [s] from then to the first slap; the rest of the lift takes 0.3 s."""
-RETURN_TIME = 2.0
-"""Time [s] after a slap within which the paw must be back in its place."""
+RAISED = 0.5  #: Height [m] of the paw from which on it counts as raised; it is held at 0.6 m
+SETTLE_TIME = 1.5  #: Time [s] from then to the first slap; the rest of the lift takes 0.3 s
+RETURN_TIME = 2.0  #: Time [s] after a slap within which the paw must be back in its place
 PAUSE = 0.3  # Time [s] from there to the next slap
 PLACE_TOLERANCE = 30.0
 """mm; a paw this near to its place is back in the pose. Dry friction in the joints keeps a part."""

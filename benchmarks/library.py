@@ -107,17 +107,11 @@ def measure(trial: Trial, found: TrialResult) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """Where the feet of a motion ended in truth, seen from where they stood at first.
+    """Where the feet of a motion ended in truth, seen from where they stood at first."""
 
-    Attributes:
-        off: distance [m], on the level, of their middle from where the motion ends.
-        turned: angle [rad] by which they are turned from there.
-        way: what the motion moves them on [m].
-    """
-
-    off: float
-    turned: float
-    way: float
+    off: float  #: distance [m], on the level, of their middle from where the motion ends
+    turned: float  #: angle [rad] by which they are turned from there
+    way: float  #: what the motion moves them on [m]
 
     @property
     def is_as_said(self) -> bool:

@@ -50,37 +50,25 @@ from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 
 FIRST_SEED = 14000
 """Seed of the first trial that is judged; those from 4000 on were, and causes found on them."""
-START_TIME, WINDOW = 3.0, 20.0
-"""Time [s] after a command that is left out, and that is measured."""
-BEYOND = Config(envelope=VelocityEnvelope(forward=4.0))
-"""Of the runs that are beyond the envelope."""
+START_TIME, WINDOW = 3.0, 20.0  #: Time [s] after a command that is left out, and that is measured
+BEYOND = Config(envelope=VelocityEnvelope(forward=4.0))  #: Of the runs that are beyond the envelope
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One command to one gait, and what is asked of it.
+    """One command to one gait, and what is asked of it."""
 
-    Attributes:
-        name: of the scenario.
-        gait: its name.
-        command: what is followed.
-        mean: greatest mean error [%]; None if it only informs.
-        mae: greatest mean absolute error [m/s]; None if it only informs.
-        saturated: greatest share of saturated ticks [%]; None if it only informs.
-        group: of the scenario.
-        speed: greatest joint speed, as a share of its limit; None if it only informs.
-        cost: greatest cost of transport; None if it only informs.
-    """
-
-    name: str
-    gait: str
-    command: VelocityCommand
-    mean: float | None
-    mae: float | None = None
+    name: str  #: of the scenario
+    gait: str  #: its name
+    command: VelocityCommand  #: what is followed
+    mean: float | None  #: greatest mean error [%]; None if it only informs
+    mae: float | None = None  #: greatest mean absolute error [m/s]; None if it only informs
     saturated: float | None = None
-    group: str = "trot"
+    """Greatest share of saturated ticks [%]; None if it only informs."""
+    group: str = "trot"  #: of the scenario
     speed: float | None = 1.0
-    cost: float | None = None
+    """Greatest joint speed, as a share of its limit; None if it only informs."""
+    cost: float | None = None  #: greatest cost of transport; None if it only informs
 
     @property
     def study(self) -> Study:

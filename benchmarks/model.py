@@ -33,13 +33,10 @@ from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
 from motions import compile_timeline, load_motion
 
-STATES = 200
-"""Random states of a trial on which the two models are compared."""
-ORACLE_PERIOD = 10
-"""Ticks between those that the other back ends solve as well."""
+STATES = 200  #: Random states of a trial on which the two models are compared
+ORACLE_PERIOD = 10  #: Ticks between those that the other back ends solve as well
 PLACO = "placo"  # It has a robot of its own, which carries nothing
-DRIVERS = ("condensed", PLACO)
-"""Back ends that drive a whole run each, every solution audited."""
+DRIVERS = ("condensed", PLACO)  #: Back ends that drive a whole run each, every solution audited
 BACKENDS = ("condensed", "full", PLACO)  # Back ends that are compared with the driving one
 # Blocks of a generalised vector by unit: base linear, base angular, joints.
 _BLOCKS = (slice(0, 3), slice(3, 6), slice(6, 18))

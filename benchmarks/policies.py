@@ -36,8 +36,7 @@ SPEED, SLIPPERY = 0.5, 0.3  # m/s, friction
 HAND_OVERS = 20
 STRIDE = GAITS["trot"].period
 KINDS = ("order", "signs", "scale", "gain")
-CLOSE = 1.5
-"""Factor by which a number that is put right may still be off."""
+CLOSE = 1.5  #: Factor by which a number that is put right may still be off
 
 
 @cache

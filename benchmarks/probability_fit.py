@@ -16,14 +16,12 @@ LEAST_SAMPLES = 20
 CENTRE_SPREAD = 2.0
 """Standard deviation of a centre about 0 before anything is seen, as of all that follow."""
 USUAL_WIDTH = 0.3  # Width before anything is seen
-WIDTH_SPREAD = 1.5
-"""Standard deviation of the logarithm of a width before anything is seen."""
+WIDTH_SPREAD = 1.5  #: Standard deviation of the logarithm of a width before anything is seen
 FARTHEST, WIDTHS = (-10.0, 10.0), (1e-3, 3.0)
 """Centres and the rest, and widths, that are looked at."""
 LEAST_SPREAD = 1e-2
 """Of a margin, as a share of its size, below which it counts as the same in all runs."""
-MOST = 20.0
-"""Value of asinh beyond which more of it, or an infinite margin, tells nothing."""
+MOST = 20.0  #: Value of asinh beyond which more of it, or an infinite margin, tells nothing
 REST_SPREAD = 5.0  # Standard deviation of the log odds of the rest
 USUAL_LEAK, LEAK_SPREAD = -3.0, 1.5
 """Log odds of the leak before anything is seen, and their standard deviation."""
@@ -130,32 +128,21 @@ def _loss(
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """How well chances foretell outcomes.
+    """How well chances foretell outcomes."""
 
-    Attributes:
-        error: expected calibration error in 10 bins of equal width (Naeini et al., AAAI 2015).
-        error_interval: of 95 %, by resampling motions (bootstrap).
-        brier: mean squared difference of chance and outcome (Brier, 1950).
-        brier_of_base_rate: the same of one who always says the share of motions done.
-        bins: of each bin that holds any: mean chance, share done, runs.
-    """
-
-    error: float
-    error_interval: tuple[float, float]
-    brier: float
-    brier_of_base_rate: float
+    error: float  #: expected calibration error in 10 bins of equal width (Naeini et al., AAAI 2015)
+    error_interval: tuple[float, float]  #: of 95 %, by resampling motions (bootstrap)
+    brier: float  #: mean squared difference of chance and outcome (Brier, 1950)
+    brier_of_base_rate: float  #: the same of one who always says the share of motions done
     bins: tuple[tuple[float, float, int], ...]
+    """Of each bin that holds any: mean chance, share done, runs."""
 
 
 def calibration(
-    chances: Float[np.ndarray, " n"],
-    done: Bool[np.ndarray, " n"],
-    motions: Sequence[str],
-    *,
-    seed: int = 0,
+    chances: Float[np.ndarray, " n"], done: Bool[np.ndarray, " n"], motions: Sequence[str]
 ) -> Calibration:
     """Compare chances with outcomes; runs of one motion are resampled together."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     names, owner = np.unique(np.array(motions), return_inverse=True)
     rows = [np.flatnonzero(owner == number) for number in range(len(names))]
     errors = []

@@ -28,8 +28,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
 from motions import FeasibilityChecker, FeasibilityReport
 
-DRAWN, SENTENCES = "drawn", 500
-"""What random sentences are, besides the two halves, and how many."""
+DRAWN, SENTENCES = "drawn", 500  #: What random sentences are, besides the two halves, and how many
 WORLDS = {TRAIN: 2, TEST: 5}
 """Worlds of each motion: a fit learns more from other motions than from other worlds."""
 FRICTION, PAYLOAD = (0.3, 1.0), (0.0, 4.0)
@@ -38,8 +37,7 @@ PLACE = ((-0.08, 0.08), (-0.04, 0.04), (0.0, 0.10))
 """Where its middle may be [m], in the frame of the base."""
 MASS_UNCERTAINTY, JOINT_FRICTION_UNCERTAINTY = 0.05, 0.5  # What the check is not told
 _STREAM = 12
-NOT_READY = "not ready"
-"""What went wrong with a robot that did not get as far as the motion."""
+NOT_READY = "not ready"  #: What went wrong with a robot that did not get as far as the motion
 
 
 def trial(seed: int) -> dict[str, object]:

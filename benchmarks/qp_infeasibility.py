@@ -30,10 +30,8 @@ BOX_HEIGHT = 0.08  # m
 FIRST_PUSH = 700  # Seed of the first series of pushes that is judged
 IMPULSE, IMPULSE_AT_STOPS = 30.0, 20.0
 """N s of a push; and at the ends of the joints, where a trot has less room to answer."""
-AT_STOP = 0.01
-"""Distance [rad] from its stop at which a calf counts as there."""
-LOOK = 0.02
-"""Time [s] between two looks at whether the robot is still up."""
+AT_STOP = 0.01  #: Distance [rad] from its stop at which a calf counts as there
+LOOK = 0.02  #: Time [s] between two looks at whether the robot is still up
 AFTERMATH = 1.0
 """Time [s] for which a robot that gave up is watched, to see whether it reports a fall."""
 UPRIGHT = np.radians(30.0)

@@ -11,35 +11,24 @@ from benchmarks.study import Metric, Results, Study, TrialResult
 
 WIDTH = 80
 _LINE = " {quantity:<26}{threshold:>12}{n:>4}{mean:>8}{sd:>8}{worst:>8}{seed:>5}{falls:>5}{verdict}"
-_COLUMN = 8
-"""Width of a number's column in it."""
-_NOTES = 3
-"""Failed seeds of a metric whose reasons are printed; JSON has all."""
+_COLUMN = 8  #: Width of a number's column in it
+_NOTES = 3  #: Failed seeds of a metric whose reasons are printed; JSON has all
 
 
 @dataclass(frozen=True, slots=True)
 class MetricResult:
-    """A metric over all its seeds.
+    """A metric over all its seeds."""
 
-    Attributes:
-        metric: which.
-        n: number of seeds that were run.
-        mean: over the seeds that gave a value; None if none did.
-        sd: standard deviation over these seeds (of the sample: n - 1); None if there are not two.
-        worst: the worst value; None if a seed gave none, since nothing is worse than that.
-        worst_seed: the seed of ``worst``, or the first that gave no value.
-        values: by seed.
-        failures: by seed, why the robot fell or did not do what it was asked.
-    """
-
-    metric: Metric
-    n: int
-    mean: float | None
+    metric: Metric  #: which
+    n: int  #: number of seeds that were run
+    mean: float | None  #: over the seeds that gave a value; None if none did
     sd: float | None
+    """Standard deviation over these seeds (of the sample: n - 1); None if there are not two."""
     worst: float | None
-    worst_seed: int | None
-    values: Mapping[int, float]
-    failures: Mapping[int, str]
+    """The worst value; None if a seed gave none, since nothing is worse than that."""
+    worst_seed: int | None  #: the seed of ``worst``, or the first that gave no value
+    values: Mapping[int, float]  #: by seed
+    failures: Mapping[int, str]  #: by seed, why the robot fell or did not do what it was asked
 
     @property
     def falls(self) -> int:

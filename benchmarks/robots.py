@@ -25,8 +25,7 @@ FRICTION_RANGE, MASS_RANGE, UNTOLD = (0.6, 1.0), (0.95, 1.05), (0.9, 1.1)
 """Friction, and factor on every mass and inertia of the robot, twice; the controller is not told.
 """
 HEIGHT_TOLERANCE, TILT_TOLERANCE = 0.02, math.radians(6.0)
-LOAD = 5.0
-"""Force [N] on a foot that counts as loaded; a standing foot carries about 40 N."""
+LOAD = 5.0  #: Force [N] on a foot that counts as loaded; a standing foot carries about 40 N
 SAMPLING = 10  # Ticks from one sample of the mean height to the next
 PUSH_TIME = 0.1  # Duration [s] of a push
 DIRECTIONS: dict[str, tuple[float, float, float]] = {

@@ -44,8 +44,7 @@ from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, compile_timeline, load_motion
 
 FOOT_RADIUS, STAND_HEIGHT = find_profile().foot_radius, find_profile().stand_height
-FIRST_SEED = 9100
-"""Seed of the first trial that is judged."""
+FIRST_SEED = 9100  #: Seed of the first trial that is judged
 CALLS = 7
 HANGS = 90.0
 """Time [s] of the robot, and of a thread, after which a call hangs: no call here may take 40."""
@@ -63,8 +62,7 @@ LYING_HEIGHT = 0.1  # m; base of a robot that lies
 MOTIONS = ("bow", "wave", "nod", "march", "push_ups", "stretch", "side_shuffle", "twist")
 POSTURES = ("stand", "sit", "lie_down", "recover")
 GOALS = ("turn_left", "turn_right", "move_forward")
-OTHERS = ("stop", "damp", "cancel", "stand", "move")
-"""What a second thread calls."""
+OTHERS = ("stop", "damp", "cancel", "stand", "move")  #: What a second thread calls
 ENDING: Mapping[str, tuple[str, ...]] = {
     "damp": (*POSTURES, *GOALS, "walk", "high_five", "play", "wait", "stop"),
     "stop": GOALS,
@@ -83,29 +81,22 @@ WRONG: tuple[tuple[str, tuple[Any, ...]], ...] = (
 """Calls whose arguments are wrong."""
 STEEP_GAITS = ("pace", "bound")
 """Both feet of a side, or of an end, stand beside the CoM: that asks for more friction than 0.3."""
-FREE = ("recover", "wait", "damp", "stop")
-"""What a robot that has fallen may be told."""
+FREE = ("recover", "wait", "damp", "stop")  #: What a robot that has fallen may be told
 
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """What the controller is not told.
+    """What the controller is not told."""
 
-    Attributes:
-        name: of the study.
-        item: what it is, for the report.
-        room: share by which True may be worse, and False must be better, than the limit that the
-            documentation names.
-        settings: of ``MujocoPlant``; on every other seed the ``others``, if there are any.
-        gaits: that are drawn.
-    """
-
-    name: str
-    item: str
+    name: str  #: of the study
+    item: str  #: what it is, for the report
     room: float
+    """Share by which True may be worse, and False must be better, than the limit that the
+    documentation names."""
     settings: Mapping[str, Any]
+    """Of ``MujocoPlant``; on every other seed the ``others``, if there are any."""
     others: Mapping[str, Any] = field(default_factory=dict)
-    gaits: tuple[str, ...] = (*GAITS, "trot", "trot", "auto")
+    gaits: tuple[str, ...] = (*GAITS, "trot", "trot", "auto")  #: that are drawn
 
     def plant(self, seed: int) -> MujocoPlant:
         """The simulated robot of a trial."""
@@ -137,25 +128,15 @@ WORLDS = (
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """One call, what follows it, and what a second thread calls meanwhile.
+    """One call, what follows it, and what a second thread calls meanwhile."""
 
-    Attributes:
-        name: of the method.
-        arguments: of it.
-        is_wrong: whether they are.
-        is_watched: whether the robot is watched for ``WATCHED`` seconds after it.
-        other: what a second thread calls, or "".
-        moment: time [s] after the beginning at which it does.
-        pause: time [s] until the next call.
-    """
-
-    name: str
-    arguments: tuple[Any, ...]
-    is_wrong: bool
-    is_watched: bool
-    other: str
-    moment: float
-    pause: float
+    name: str  #: of the method
+    arguments: tuple[Any, ...]  #: of it
+    is_wrong: bool  #: whether they are
+    is_watched: bool  #: whether the robot is watched for ``WATCHED`` seconds after it
+    other: str  #: what a second thread calls, or ""
+    moment: float  #: time [s] after the beginning at which it does
+    pause: float  #: time [s] until the next call
 
     def __str__(self) -> str:
         """As it is written."""

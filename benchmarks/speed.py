@@ -26,14 +26,12 @@ from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, Timeline, compile_timeline, load_motion
 
-ROUNDS = 9
-"""Times that every motion is compiled and checked, in turn with the others."""
+ROUNDS = 9  #: Times that every motion is compiled and checked, in turn with the others
 LIBRARY = "tap_dance"
 """The motion of the library that costs most to compile: it raises a foot every other second."""
 LENGTHS = (10, 40)
 """Lengths [s] of the generated motions; that the work grows as they do, a test says by counting."""
-CHECK_BAR = 60.0
-"""Greatest cost [ms] of checking 10 s of motion, with its probability."""
+CHECK_BAR = 60.0  #: Greatest cost [ms] of checking 10 s of motion, with its probability
 _MOTIONS = (LIBRARY, *(f"{seconds} s" for seconds in LENGTHS))
 CHECKS = {
     f"10 s of motion: {motion}": (

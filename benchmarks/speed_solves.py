@@ -55,27 +55,19 @@ TABLE = {
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """What the QP was asked in one tick of a run.
+    """What the QP was asked in one tick of a run."""
 
-    Attributes:
-        state: measured.
-        snapshot: of it.
-        reference: what was asked for.
-        is_packed: whether it came as the row of numbers that the kernel reads.
-    """
-
-    state: RobotState
-    snapshot: Snapshot
-    reference: Reference
-    is_packed: bool
+    state: RobotState  #: measured
+    snapshot: Snapshot  #: of it
+    reference: Reference  #: what was asked for
+    is_packed: bool  #: whether it came as the row of numbers that the kernel reads
 
     def asked(self) -> Reference:
         """The reference as it came: a copy that is not packed yet if it was not."""
         return self.reference if self.is_packed else replace(self.reference)
 
 
-Ticks = Mapping[int, Sequence[Tick]]
-"""By number of stance feet."""
+Ticks = Mapping[int, Sequence[Tick]]  #: By number of stance feet
 
 
 class Recorder(WholeBodyController):

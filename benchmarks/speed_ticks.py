@@ -28,8 +28,7 @@ PERIOD = 2000.0  # Robot time [us] of a tick
 TROT_TIME = 100  # Time [us] that a tick of the trot may take
 FACTORS = {"stand": 15, "trot": 18, "high five": 15, "bow": 15, "sit": 15, "lie down": 15}
 """Real-time factor to be reached in each mode."""
-COMMAND_TIME = 60.0
-"""Robot time [s] of random velocity commands, a new one each second."""
+COMMAND_TIME = 60.0  #: Robot time [s] of random velocity commands, a new one each second
 FASTEST = (1.0, 0.4, 1.5)
 """Ahead and sideways [m/s], turning [rad/s]: the greatest of these commands."""
 ESTIMATED_TIME = 10.0  # Robot time [s] of the trot on sensors
@@ -38,8 +37,7 @@ REAL_TIME = 60.0  # Time [s] of the trot at the wall clock's pace
 REPEATS = 3  # How often the same walk is done
 TRACED_TICKS = 500  # Ticks whose memory is traced
 CALIBRATION_CALLS = 200  # Calls by which a piece of bare work is measured
-GIVEN_UP = 1.0
-"""Lag [s] from which on the pace is given up: never in a run that means anything."""
+GIVEN_UP = 1.0  #: Lag [s] from which on the pace is given up: never in a run that means anything
 
 
 def _tick_rows(mode: str) -> tuple[tuple[str, str, str], ...]:

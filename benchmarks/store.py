@@ -20,10 +20,8 @@ from go2_wbc.config import Config
 from go2_wbc.errors import ConfigError
 
 ROOT = Path(__file__).resolve().parent.parent
-FOLDER = Path("out/benchmarks")
-"""Where finished trials are kept, in a folder for each benchmark."""
-_WORDS = ("failures", "notes")
-"""Of a trial, by row."""
+FOLDER = Path("out/benchmarks")  #: Where finished trials are kept, in a folder for each benchmark
+_WORDS = ("failures", "notes")  #: Of a trial, by row
 
 
 def settings_header() -> dict[str, str]:
@@ -34,15 +32,11 @@ def settings_header() -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """The finished trials of studies.
-
-    Attributes:
-        finished: trials of the run that is resumed, by study and seed.
-        files: by study.
-    """
+    """The finished trials of studies."""
 
     finished: dict[tuple[str, int], TrialResult]
-    files: dict[str, SweepFile]
+    """Trials of the run that is resumed, by study and seed."""
+    files: dict[str, SweepFile]  #: by study
 
     def add(self, study: Study, seed: int, result: TrialResult) -> None:
         """Keep a trial: whoever kills the process leaves all of it or nothing."""

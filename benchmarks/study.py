@@ -19,8 +19,7 @@ IDEAL, IMU = "ideal", "imu"
 """The state that the controller is given: the true one, or what its own sensors tell."""
 SENSED = "sensed-"  # What names on the robot's own sensors begin with
 BAR = re.compile(r"(<=|>=)? ?(-?\d[-\d.e]*(?= |$))? ?(.*)")  # Side, threshold and unit
-Rows = Sequence[tuple[str, str, str]]
-"""Name, quantity and bar."""
+Rows = Sequence[tuple[str, str, str]]  #: Name, quantity and bar
 
 
 class Direction(Enum):
@@ -41,23 +40,15 @@ class Direction(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """One row of the report: a quantity of which every trial gives one value.
+    """One row of the report: a quantity of which every trial gives one value."""
 
-    Attributes:
-        name: unique among all metrics.
-        item: what the robot does; metrics of one item stand together.
-        quantity: what is measured.
-        unit: of the value; empty for a ratio or a count.
-        threshold: what the mean over the seeds must reach; ``None`` for one that only informs.
-        direction: on which side of the threshold is good.
-    """
-
-    name: str
-    item: str
-    quantity: str
-    unit: str
+    name: str  #: unique among all metrics
+    item: str  #: what the robot does; metrics of one item stand together
+    quantity: str  #: what is measured
+    unit: str  #: of the value; empty for a ratio or a count
     threshold: float | None
-    direction: Direction = Direction.AT_MOST
+    """What the mean over the seeds must reach; ``None`` for one that only informs."""
+    direction: Direction = Direction.AT_MOST  #: on which side of the threshold is good
 
     @staticmethod
     def of(name: str, item: str, quantity: str, bar: str) -> Metric:
@@ -70,19 +61,15 @@ class Metric:
 
 @dataclass(slots=True)
 class TrialResult:
-    """What one trial of a study gave; it fills this as it goes.
-
-    Attributes:
-        values: by row. One without a value counts as failed.
-        failures: by row, why the robot did not do it although there may be a value.
-        reason: why rows without a value have none; empty if all have one.
-        notes: what else is worth keeping, by name; is on disk only.
-    """
+    """What one trial of a study gave; it fills this as it goes."""
 
     values: dict[str, float] = field(default_factory=dict)
+    """By row. One without a value counts as failed."""
     failures: dict[str, str] = field(default_factory=dict)
-    reason: str = ""
+    """By row, why the robot did not do it although there may be a value."""
+    reason: str = ""  #: why rows without a value have none; empty if all have one
     notes: dict[str, str] = field(default_factory=dict)
+    """What else is worth keeping, by name; is on disk only."""
 
     def failure(self, metric: str) -> str | None:
         """Why this trial counts as failed for ``metric``, or None."""
@@ -110,29 +97,20 @@ def joined(prefix: str, name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """Rows that are measured together, in one trial.
+    """Rows that are measured together, in one trial."""
 
-    Attributes:
-        name: what the command line takes.
-        table: by item, in the order of the report.
-        measure: runs one trial; must be a function of a module, so that a process can import it. A
-            robot that fails ends it: what was found until then counts, the rest has failed.
-        prefix: of the rows' names; None for the study's own name.
-        done: the row, if any, that is 1 where a trial comes to its end, and 0, and failed, where
-            it does not.
-        seed_factor: how many times the usual number of seeds it runs.
-        group: what the command line takes for all studies of the same kind; may be empty.
-        sensors: of the robot; None if it has no choice.
-    """
-
-    name: str
-    table: Mapping[str, Rows]
+    name: str  #: what the command line takes
+    table: Mapping[str, Rows]  #: by item, in the order of the report
     measure: Callable[[Trial, TrialResult], None]
-    prefix: str | None = None
+    """Runs one trial; must be a function of a module, so that a process can import it. A robot that
+    fails ends it: what was found until then counts, the rest has failed."""
+    prefix: str | None = None  #: of the rows' names; None for the study's own name
     done: str | None = None
-    seed_factor: int = 1
-    group: str = ""
-    sensors: str | None = IDEAL
+    """The row, if any, that is 1 where a trial comes to its end, and 0, and failed, where it does
+    not."""
+    seed_factor: int = 1  #: how many times the usual number of seeds it runs
+    group: str = ""  #: what the command line takes for all studies of the same kind; may be empty
+    sensors: str | None = IDEAL  #: of the robot; None if it has no choice
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
@@ -177,10 +155,8 @@ class Study:
         return found.named(self._prefix)
 
 
-Results = dict[str, dict[int, TrialResult]]
-"""What every trial gave, by study and seed."""
-Task = tuple[Study, int]
-"""A study and the seed of one trial."""
+Results = dict[str, dict[int, TrialResult]]  #: What every trial gave, by study and seed
+Task = tuple[Study, int]  #: A study and the seed of one trial
 
 
 def chosen_studies(studies: Sequence[Study], names: Sequence[str]) -> tuple[Study, ...]:

@@ -60,30 +60,21 @@ TURN, TURN_TOLERANCE = math.pi / 2, 0.1
 """Angle that is turned to the left, and by which the true one may differ [rad]."""
 THROW, THROW_TIME = np.array([0.0, 600.0, 200.0]), 0.25
 """Force [N] ahead, left, up that throws a robot over, and for how long it does [s]."""
-DOWN_TIME = 2.5
-"""Time [s] after which one that was thrown is asked to recover."""
+DOWN_TIME = 2.5  #: Time [s] after which one that was thrown is asked to recover
 
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """One world and one command.
+    """One world and one command."""
 
-    Attributes:
-        name: of the scenario.
-        item: what it is, for the report.
-        speed: wanted, ahead [m/s]; 0 to stand only.
-        time: for which it is walked, or stood [s].
-        heading: at the start [rad].
-        settings: of ``MujocoPlant``, instead of what is drawn. Boxes take their seed from the
-            trial; with a payload the mass of the robot is that of the model.
-    """
-
-    name: str
-    item: str
-    speed: float = 0.5
-    time: float = 8.0
-    heading: float = UP
+    name: str  #: of the scenario
+    item: str  #: what it is, for the report
+    speed: float = 0.5  #: wanted, ahead [m/s]; 0 to stand only
+    time: float = 8.0  #: for which it is walked, or stood [s]
+    heading: float = UP  #: at the start [rad]
     settings: Mapping[str, Any] = field(default_factory=dict)
+    """Of ``MujocoPlant``, instead of what is drawn. Boxes take their seed from the trial; with a
+    payload the mass of the robot is that of the model."""
 
     @property
     def study(self) -> Study:
@@ -191,25 +182,16 @@ def no_file() -> None:
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """One robot.
+    """One robot."""
 
-    Attributes:
-        name: of the scenario.
-        item: what it is, for the report.
-        joints: friction, damping and armature, where there is no MJCF; None for its own.
-        config: of the controller; None for its own.
-        mjcf: gives the file, None where it is not installed.
-        robot: its profile.
-        calls: what it is asked for, one after the other.
-    """
-
-    name: str
-    item: str
+    name: str  #: of the scenario
+    item: str  #: what it is, for the report
     joints: JointDynamics | None = None
-    config: Config | None = None
-    mjcf: Callable[[], Path | None] = no_file
-    robot: str = GO2
-    calls: tuple[str, ...] = CALLS
+    """Friction, damping and armature, where there is no MJCF; None for its own."""
+    config: Config | None = None  #: of the controller; None for its own
+    mjcf: Callable[[], Path | None] = no_file  #: gives the file, None where it is not installed
+    robot: str = GO2  #: its profile
+    calls: tuple[str, ...] = CALLS  #: what it is asked for, one after the other
 
     @property
     def study(self) -> Study:

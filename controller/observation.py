@@ -31,21 +31,13 @@ STANCE_HEIGHT = 0.32  #: of the base [m] in that stance, on soles that just touc
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """Numbers that belong together.
+    """Numbers that belong together."""
 
-    Attributes:
-        name: of all of them.
-        parts: name of each, in order.
-        units: of each; "1" for a share or a direction.
-        limit: magnitude from which on each is cut.
-        about: what it is, in a line.
-    """
-
-    name: str
-    parts: tuple[str, ...]
-    units: tuple[str, ...]
-    limit: float
-    about: str
+    name: str  #: of all of them
+    parts: tuple[str, ...]  #: name of each, in order
+    units: tuple[str, ...]  #: of each; "1" for a share or a direction
+    limit: float  #: magnitude from which on each is cut
+    about: str  #: what it is, in a line
 
     @property
     def size(self) -> int:
@@ -169,23 +161,16 @@ ACTIONS = {
 
 @dataclass(frozen=True, slots=True)
 class Actuation:
-    """What actions mean: turns them into commands, and back.
-
-    Attributes:
-        kind: "targets" of the joints' servo, which the plant evaluates in every physics step, or
-            "torques".
-        kp, kd: of the servo [N m/rad], [N m s/rad].
-        torque_limits: of the joints [N m], which torques are shares of.
-        stance: angles of the joints [rad] from which targets count.
-        reach: way [rad] that an action of 1 means.
-    """
+    """What actions mean: turns them into commands, and back."""
 
     kind: str
-    torque_limits: Array12
-    kp: float = KP
-    kd: float = KD
-    stance: tuple[float, ...] = STANCE * 4
-    reach: float = 1.0
+    """"targets" of the joints' servo, which the plant evaluates in every physics step, or
+    "torques"."""
+    torque_limits: Array12  #: of the joints [N m], which torques are shares of
+    kp: float = KP  #: of the servo [N m/rad]
+    kd: float = KD  #: of the servo [N m s/rad]
+    stance: tuple[float, ...] = STANCE * 4  #: angles of the joints [rad] from which targets count
+    reach: float = 1.0  #: way [rad] that an action of 1 means
 
     __repr__ = brief
 

@@ -27,57 +27,41 @@ Stance = Posture  #: The former name of ``Posture``, kept for scripts that use i
 
 @dataclass(frozen=True, slots=True)
 class Footsteps:
-    """What is known of a plan whose feet step to places, so that they can land when they do.
+    """What is known of a plan whose feet step to places, so that they can land when they do."""
 
-    Attributes:
-        contacts: who stands when.
-        swings: (m, 4) at each event of ``contacts``, the feet in the air that follow their places.
-        unloads: (m, 4) when [s] each foot that stands lifts off next, if it gives up its load
-            before that; inf if it pushes off.
-        ramp: time [s] over which a foot takes up its load after touchdown and gives it up before
-            lift-off.
-        normal_force_min, normal_force_max: bounds [N] of a stance foot's normal force.
-    """
-
-    contacts: ContactSchedule
+    contacts: ContactSchedule  #: who stands when
     swings: Bool[np.ndarray, "m 4"]
+    """(m, 4) at each event of ``contacts``, the feet in the air that follow their places."""
     unloads: Float[np.ndarray, "m 4"]
+    """(m, 4) when [s] each foot that stands lifts off next, if it gives up its load before that;
+    inf if it pushes off."""
     ramp: float
-    normal_force_min: float
-    normal_force_max: float
+    """Time [s] over which a foot takes up its load after touchdown and gives it up before
+    lift-off."""
+    normal_force_min: float  #: least normal force [N] of a stance foot
+    normal_force_max: float  #: greatest normal force [N] of a stance foot
 
 
 @dataclass(frozen=True, slots=True)
 class PlanFeedback:
-    """How a solved plan brings the robot back to its state, at one instant.
+    """How a solved plan brings the robot back to its state, at one instant."""
 
-    Attributes:
-        q, v: (19,), (18,) planned configuration and velocity, in the motion's frame.
-        gains: feedback of the state's error (as Pinocchio's ``difference`` of planned and measured
-            q, then of v) into torques: tau - gains @ error [N m].
-    """
-
-    q: Float[np.ndarray, "19"]
-    v: Float[np.ndarray, "18"]
+    q: Float[np.ndarray, "19"]  #: planned configuration, in the motion's frame
+    v: Float[np.ndarray, "18"]  #: planned velocity, in the motion's frame
     gains: Float[np.ndarray, "12 36"]
+    """Feedback of the state's error (as Pinocchio's ``difference`` of planned and measured q, then
+    of v) into torques: tau - gains @ error [N m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class HeldFoot:
-    """A foot that must be held up.
+    """A foot that must be held up."""
 
-    Attributes:
-        name: of the span.
-        leg: whose foot.
-        start, end: when [s].
-        height: planned for its centre above the ground [m].
-    """
-
-    name: str
-    leg: Leg
-    start: float
-    end: float
-    height: float
+    name: str  #: of the span
+    leg: Leg  #: whose foot
+    start: float  #: from when on [s]
+    end: float  #: until when [s]
+    height: float  #: planned for its centre above the ground [m]
 
 
 class MotionPlan(ABC):

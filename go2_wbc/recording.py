@@ -65,16 +65,11 @@ LIMITS = _limits()
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A stretch of time with one label.
+    """A stretch of time with one label."""
 
-    Attributes:
-        start, end: seconds after the start of the recording.
-        label: what the robot was doing.
-    """
-
-    start: float
-    end: float
-    label: str
+    start: float  #: seconds after the start of the recording
+    end: float  #: seconds after the start of the recording
+    label: str  #: what the robot was doing
 
 
 @typed()
@@ -271,5 +266,4 @@ def viewer(name: str) -> Any:  # noqa: ANN401 - each makes something else of a r
 
 _ARRAYS = tuple(field.name for field in fields(Recording))[:8]
 """The fields that have a row for each sample."""
-_NOTED = ("multipliers", "gave_way")
-"""Those that may have one."""
+_NOTED = ("multipliers", "gave_way")  #: Those that may have one

@@ -5,8 +5,6 @@ and under ``TYPE_CHECKING``. ``test_architecture.py`` applies the rules to this 
 small trees that break them.
 """
 
-from __future__ import annotations
-
 import ast
 import math
 import re

@@ -35,8 +35,7 @@ STAND_JOINTS = np.tile([0.0, 0.85, -1.7], 4)
 MIRRORED_LEGS = [leg.mirror for leg in LEGS]
 POLAR = np.array([1.0, -1.0, 1.0])
 """What the mirror y -> -y does to positions, velocities and forces."""
-AXIAL = -POLAR
-"""What it does to angular velocities and moments."""
+AXIAL = -POLAR  #: What it does to angular velocities and moments
 
 
 def state_of(q: np.ndarray, v: np.ndarray | None = None, time: float = 0.0) -> RobotState:

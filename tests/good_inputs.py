@@ -1,7 +1,5 @@
 """Good values for what is public, beside which ``test_bad_inputs`` tries a bad one."""
 
-from __future__ import annotations
-
 import importlib
 import tempfile
 from collections.abc import Callable
@@ -158,8 +156,7 @@ EXEMPT |= {
 """What is made or asked in every tick is not checked there: what takes it refuses what is wrong."""
 EXEMPT_HUGE = {"go2_wbc.VelocityCommand", "go2_wbc.BodyPose"}
 """Where it is followed a velocity is clipped, with a warning, and a pose is refused."""
-LEGAL = {("go2-wbc new name", "nonsense")}
-"""What is not wrong at all."""
+LEGAL = {("go2-wbc new name", "nonsense")}  #: What is not wrong at all
 
 
 def _value(value: object) -> Callable[[], object]:

@@ -25,8 +25,7 @@ def rise() -> Timeline:
 '''
 TOO_HIGH = GOOD.replace("z=0.01", "z=0.18")
 BROKEN = GOOD.replace("z=0.01,", "z=0.01")
-_PATIENCE = 60.0
-"""How long [s] the program may take to end."""
+_PATIENCE = 60.0  #: How long [s] the program may take to end
 
 
 def _hear_ctrl_c() -> None:

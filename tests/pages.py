@@ -23,8 +23,7 @@ from tests.script_server import run_script
 
 ROOT = Path(__file__).resolve().parent.parent
 BRIDGES = tuple(f"docs/{name}.md" for name in ("ros2", "unitree", "real_robot"))
-MADE = ("docs/reference/api/", "docs/_build/")
-"""What the build of the documentation writes."""
+MADE = ("docs/reference/api/", "docs/_build/")  #: What the build of the documentation writes
 DOCS = tuple(
     name
     for file in sorted(ROOT.glob("docs/**/*.md"))

@@ -16,10 +16,8 @@ from tests.engine_helpers import STAND_JOINTS
 
 STAND_HEIGHT = find_profile().stand_height
 
-LIFT_OFF, TOUCHDOWN = 0.8, 1.2
-"""Of the step [s]."""
-TAKE_OFF, SPEED = 0.5, 1.2
-"""Of the hop: when [s] and how fast [m/s]."""
+LIFT_OFF, TOUCHDOWN = 0.8, 1.2  #: Of the step [s]
+TAKE_OFF, SPEED = 0.5, 1.2  #: Of the hop: when [s] and how fast [m/s]
 LANDING = TAKE_OFF + 2 * SPEED / 9.81
 _HOP_RAMP, _STEP_RAMP = 0.01, 0.1
 

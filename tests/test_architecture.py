@@ -3,8 +3,6 @@
 Each rule is tested twice: this project keeps it, and a small tree that breaks it is caught.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

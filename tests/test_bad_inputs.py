@@ -8,8 +8,6 @@ own that says what was wrong, or in a warning; on the command line with the exit
 usage. It runs without the checks of types that the tests have, since users have none.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import dataclasses
@@ -80,19 +78,12 @@ Call = Callable[[], object]
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One bad value.
+    """One bad value."""
 
-    Attributes:
-        where: what it is given to.
-        value: it.
-        call: gives it.
-        code: with which a command must end; None for what is no command.
-    """
-
-    where: str
-    value: object
-    call: Call
-    code: int | None = None
+    where: str  #: what it is given to
+    value: object  #: it
+    call: Call  #: gives it
+    code: int | None = None  #: with which a command must end; None for what is no command
 
     def __str__(self) -> str:
         return f"{self.where} = {self.value!r:.40}"

@@ -45,8 +45,7 @@ KNEE_SHARE = find_profile().knee_share
 TUTORIAL, LANGUAGE, FEASIBILITY = (
     f"docs/{name}.md" for name in ("tutorial", "motions", "feasibility")
 )
-EASE_SIGNS = 5
-"""Columns of the table of easing, besides the name."""
+EASE_SIGNS = 5  #: Columns of the table of easing, besides the name
 CONTROLLER, COMMAND_LINE, CONFIGURATION = (
     f"docs/reference/{name}.md" for name in ("controller", "command-line", "configuration")
 )

@@ -15,8 +15,7 @@ from tests.script_server import run_script
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "examples"
 SCRIPTS = sorted(FOLDER.glob("*.py"))
-LEAST, MOST = 10, 60
-"""Lines of an example."""
+LEAST, MOST = 10, 60  #: Lines of an example
 FEWEST = 24
 NEEDS = {
     "19_log_to_a_data_frame": "pandas",

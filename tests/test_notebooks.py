@@ -18,17 +18,14 @@ ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "docs" / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 NAMES = ("designing_a_motion", "first_steps", "how_the_wbc_works", "reading_a_recording")
-LARGEST = 300_000
-"""Bytes of a notebook with its outputs."""
-HANGS = 600.0
-"""Time [s] after which a notebook counts as hanging; each takes about 15 s of CPU."""
+LARGEST = 300_000  #: Bytes of a notebook with its outputs
+HANGS = 600.0  #: Time [s] after which a notebook counts as hanging; each takes about 15 s of CPU
 NEAR = 0.1
 """Relative difference from the committed numbers: a run repeats to the bit on one machine only."""
 QUANTITY = re.compile(r"(\d+(?:\.\d+)?) (mm|cm|m/s|m|rad|deg|s|ms|N m|N s|N|kg|MB|%)(?![\w^])")
 """A number with its unit, and how many of the base unit that is."""
 SCALES = {"mm": 1e-3, "cm": 1e-2, "ms": 1e-3, "%": 1e-2}
-ROUNDING = re.compile(r"\d(\.\d+)?e-\d\d")
-"""Errors of rounding, which differ between machines."""
+ROUNDING = re.compile(r"\d(\.\d+)?e-\d\d")  #: Errors of rounding, which differ between machines
 MACHINE = re.compile(r"/(home|root|work|tmp|Users|usr|opt|var)/|[A-Z]:\\")
 NEEDED = ("nbclient", "nbformat", "ipykernel", "matplotlib", "pandas")
 MISSING = [name for name in NEEDED if importlib.util.find_spec(name) is None]

@@ -22,8 +22,7 @@ from tests.viz.replay.browsing import chromium
 
 NEEDED = ("sphinx", "furo", "math_core", "myst_nb", "sphinx_copybutton")
 MISSING = [name for name in NEEDED if find_spec(name) is None]
-BUILT = os.environ.get("GO2_WBC_SITE")
-"""Where a build has just put the site."""
+BUILT = os.environ.get("GO2_WBC_SITE")  #: Where a build has just put the site
 IS_REQUIRED = os.environ.get("GO2_WBC_REQUIRE_DOCS") == "1"
 GRAPH = {
     "cli": {"loop", "robot", "errors"},

@@ -21,16 +21,14 @@ import numpy as np
 from beartype import BeartypeConf, FrozenDict, beartype
 from jaxtyping import _decorator
 
-CHECKED_CALLS = 10
-"""Of each place: a tick of the control loop has 400, and a check takes 25 us."""
+CHECKED_CALLS = 10  #: Of each place: a tick of the control loop has 400, and a check takes 25 us
 STRIDE = 251
 """Prime, so that the calls of a loop come up in turn, whatever their number. A control loop makes
 its calls as often in half a second; at every 61st the checks took a quarter of a tick."""
 _ARRAY: Any = type(jaxtyping.Float[np.ndarray, "1"])
 _MEANINGS = FrozenDict({bool: bool | np.bool_, Self: object})
 _check = beartype(conf=BeartypeConf(is_pep484_tower=True, hint_overrides=_MEANINGS))
-_calls: dict[int, int] = {}
-"""By place: how many calls it has made since the last ``renew``."""
+_calls: dict[int, int] = {}  #: By place: how many calls it has made since the last ``renew``
 
 
 def checked(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -14,12 +14,10 @@ from tests.controller.bridges.ros2_processes import Probe, joined, quiet_client,
 
 NAMESPACE: Final = "bench"
 CALLS: Final = 300
-CALL_LIMIT: Final = 5.0
-"""Time [s] after which a call counts as lost."""
+CALL_LIMIT: Final = 5.0  #: Time [s] after which a call counts as lost
 UNKNOWN: Final = "no_such_behaviour"
 """A command that moves nothing: what is left is the way there and back."""
-SPEED: Final = 0.3
-"""Forward speed [m/s] that is commanded."""
+SPEED: Final = 0.3  #: Forward speed [m/s] that is commanded
 DRIVE_TIME, SETTLE_TIME = 20.0, 2.0
 """Time [s] of the drive, and of its start that does not count for the speed."""
 ROS_CPU: Final = ("ros_cpu_in_loop", "cpu_of_other_threads")

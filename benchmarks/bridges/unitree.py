@@ -26,13 +26,11 @@ from tests.controller.bridges.unitree_processes import (
 )
 
 MOVE_TIME, MOVE_PERIOD = 3.0, 0.05
-STREAM_TIME: Final = 10.0
-"""Time [s] of listening at 500 Hz."""
+STREAM_TIME: Final = 10.0  #: Time [s] of listening at 500 Hz
 ROUND_TRIPS: Final = 200
 CODINGS: Final = 2000
 DAMPED: Final = JointCommand.damping(3.0)
-DRIVE_LIMIT: Final = 120.0
-"""Time [s] after which a drive counts as hanging."""
+DRIVE_LIMIT: Final = 120.0  #: Time [s] after which a drive counts as hanging
 
 SPORT: Final = (
     ("codes", "calls not answered 0", "<= 0"),

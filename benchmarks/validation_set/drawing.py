@@ -66,24 +66,15 @@ Write = Callable[[Draw, float], Timeline]
 
 @dataclass(frozen=True, slots=True)
 class Family:
-    """Motions of one structure.
+    """Motions of one structure."""
 
-    Attributes:
-        name: unique.
-        write: the motion of a draw at an amplitude.
-        low, high: amplitudes between which physics is expected to change its mind; own guesses.
-        is_dynamic: whether it is solved, or the robot leaves the ground.
-        late: time [s] into the plan at which it is entered; above 0 for a wrong entry.
-        draws: how many of its borders are bisected.
-    """
-
-    name: str
-    write: Write
-    low: float = 0.2
-    high: float = 4.0
-    is_dynamic: bool = False
-    late: float = 0.0
-    draws: int = 1
+    name: str  #: unique
+    write: Write  #: the motion of a draw at an amplitude
+    low: float = 0.2  #: amplitude at which physics is expected to say yes; own guess
+    high: float = 4.0  #: amplitude at which it is expected to say no; own guess
+    is_dynamic: bool = False  #: whether it is solved, or the robot leaves the ground
+    late: float = 0.0  #: time [s] into the plan at which it is entered; above 0 for a wrong entry
+    draws: int = 1  #: how many of its borders are bisected
 
     @property
     def half(self) -> str:

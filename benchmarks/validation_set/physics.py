@@ -29,34 +29,26 @@ from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 
-FRICTION = 0.5
-"""Friction coefficient of the floor: the one that the check counts on."""
+FRICTION = 0.5  #: Friction coefficient of the floor: the one that the check counts on
 NEAR, NEAR_SOLVED = 1.06, 1.13
 """Ratio of amplitudes, one done and one failed, at which the search ends."""
 STEP, STEP_SOLVED = 1.6, 1.25  # Ratio of amplitudes in the search for two that differ
 BORDER, PLAYS = "border", "plays"
 BORDERS_FILE = Path(__file__).parent / "borders.json"
 STRICT, STOPS, LENIENT = "strict", "stops", "lenient"
-LENIENT_OFF = 0.05
-"""Distance [m] that anything may be off what was written, leniently."""
+LENIENT_OFF = 0.05  #: Distance [m] that anything may be off what was written, leniently
 
 
 @dataclass(frozen=True, slots=True)
 class MotionFailures:
-    """What went wrong, in words, by each definition; nothing did where it is empty.
+    """What went wrong, in words, by each definition; nothing did where it is empty."""
 
-    Attributes:
-        strict: what an author sees: not done, or not as it was written.
-        stops: the same, or a joint was pressed against its stop: MuJoCo's hold a joint within
-            0.02 rad of its limit, so a motion that asks for more often looks done.
-        lenient: distances from the plan, with more room, whatever ``play`` says.
-        fell: nothing else.
-    """
-
-    strict: tuple[str, ...]
+    strict: tuple[str, ...]  #: what an author sees: not done, or not as it was written
     stops: tuple[str, ...]
-    lenient: tuple[str, ...]
-    fell: tuple[str, ...]
+    """The same, or a joint was pressed against its stop: MuJoCo's hold a joint within 0.02 rad of
+    its limit, so a motion that asks for more often looks done."""
+    lenient: tuple[str, ...]  #: distances from the plan, with more room, whatever ``play`` says
+    fell: tuple[str, ...]  #: nothing else
 
     def by(self, definition: str) -> tuple[str, ...]:
         """What went wrong by ``STRICT``, ``STOPS``, ``LENIENT`` or ``FELL``."""

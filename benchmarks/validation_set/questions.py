@@ -51,19 +51,12 @@ class LateStart(MotionPlan):
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """One motion.
+    """One motion."""
 
-    Attributes:
-        family: its structure.
-        draw: number of the draw of its free numbers.
-        amplitude: of what the family scales.
-        stratum: how it was chosen.
-    """
-
-    family: Family
-    draw: int
-    amplitude: float
-    stratum: str = ""
+    family: Family  #: its structure
+    draw: int  #: number of the draw of its free numbers
+    amplitude: float  #: of what the family scales
+    stratum: str = ""  #: how it was chosen
 
     @property
     def name(self) -> str:

@@ -28,19 +28,12 @@ _STREAM, _GROWTH = 4242, 10_000_000
 
 @dataclass(frozen=True, slots=True)
 class RandomTimeline:
-    """One timeline, at one size.
+    """One timeline, at one size."""
 
-    Attributes:
-        number: of the timeline.
-        step: which of ``FACTORS``.
-        amplitude: by which all its sizes are multiplied.
-        pace: by which all its times are divided.
-    """
-
-    number: int
-    step: int
-    amplitude: float
-    pace: float
+    number: int  #: of the timeline
+    step: int  #: which of ``FACTORS``
+    amplitude: float  #: by which all its sizes are multiplied
+    pace: float  #: by which all its times are divided
 
     @property
     def name(self) -> str:

@@ -24,23 +24,14 @@ HALVES = (TRAIN, TEST)
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One motion.
+    """One motion."""
 
-    Attributes:
-        name: unique.
-        half: train or test.
-        stratum: how its amplitude was chosen.
-        is_dynamic: whether it is solved.
-        refusal: checks that refuse it; it passed if there is none.
-        outcome: what went wrong in physics.
-    """
-
-    name: str
-    half: str
-    stratum: str
-    is_dynamic: bool
-    refusal: tuple[str, ...]
-    outcome: MotionFailures
+    name: str  #: unique
+    half: str  #: train or test
+    stratum: str  #: how its amplitude was chosen
+    is_dynamic: bool  #: whether it is solved
+    refusal: tuple[str, ...]  #: checks that refuse it; it passed if there is none
+    outcome: MotionFailures  #: what went wrong in physics
 
     @property
     def has_plan(self) -> bool:
@@ -94,18 +85,12 @@ class Score(NamedTuple):
 
     A refusal is a prediction that the motion goes wrong, a pass that it is done. Each can be
     judged by how often it is right (precision), and by how much it finds (recall).
-
-    Attributes:
-        refused_right: of the refused motions, those that go wrong: precision of refusals.
-        wrong_refused: of the motions that go wrong, those refused: recall of refusals.
-        passed_right: of the passed motions, those that are done: precision of passes.
-        done_passed: of the motions that are done, those passed: recall of passes.
     """
 
-    refused_right: Share
-    wrong_refused: Share
-    passed_right: Share
-    done_passed: Share
+    refused_right: Share  #: of the refused motions, those that go wrong: precision of refusals
+    wrong_refused: Share  #: of the motions that go wrong, those refused: recall of refusals
+    passed_right: Share  #: of the passed motions, those that are done: precision of passes
+    done_passed: Share  #: of the motions that are done, those passed: recall of passes
 
     @staticmethod
     def of(cases: Iterable[Case], definition: str = STRICT) -> Score:

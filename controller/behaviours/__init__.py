@@ -18,17 +18,11 @@ from go2_wbc.robot.state import JointCommand, RobotState, Snapshot
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """What to track while somebody else moves the joints, too.
+    """What to track while somebody else moves the joints, too."""
 
-    Attributes:
-        reference: for the whole-body controller.
-        command: of the other one.
-        share: of that in the torques, above 0, at most 1.
-    """
-
-    reference: Reference
-    command: JointCommand
-    share: float
+    reference: Reference  #: for the whole-body controller
+    command: JointCommand  #: of the other one
+    share: float  #: of that in the torques, above 0, at most 1
 
     @property
     def stance(self) -> Bool[np.ndarray, "4"]:
@@ -49,28 +43,19 @@ class Shared:
 
 
 class Behaviour(ABC):
-    """Something the robot does: ``start`` once, then ``update`` every tick.
+    """Something the robot does: ``start`` once, then ``update`` every tick."""
 
-    Attributes:
-        label: what is written in recordings.
-        duration: time [s] that it takes, unless it says otherwise by ``is_finished``.
-        needs_balance: whether a large tilt means that the robot has fallen.
-        may_lie: whether the belly may be on the ground.
-        is_dynamic: whether it flies, or stands on few feet.
-        knows_payload: whether the robot is taken to carry what was felt, and goes on feeling it.
-        delay: after which commands act [s], as far as that is known.
-        sag_and_lean: depth [m] of the trunk below where it shall be and angle [rad] from how it
-            shall be, if what is tracked says something else; None if it says so itself.
-    """
-
-    label: str = "?"
-    duration: float = 0.0
-    needs_balance: bool = True
-    may_lie: bool = False
-    is_dynamic: bool = False
+    label: str = "?"  #: what is written in recordings
+    duration: float = 0.0  #: time [s] that it takes, unless it says otherwise by ``is_finished``
+    needs_balance: bool = True  #: whether a large tilt means that the robot has fallen
+    may_lie: bool = False  #: whether the belly may be on the ground
+    is_dynamic: bool = False  #: whether it flies, or stands on few feet
     knows_payload: bool = False
+    """Whether the robot is taken to carry what was felt, and goes on feeling it."""
     sag_and_lean: tuple[float, float] | None = None
-    delay: float = 0.0
+    """Depth [m] of the trunk below where it shall be and angle [rad] from how it shall be, if what
+    is tracked says something else; None if it says so itself."""
+    delay: float = 0.0  #: after which commands act [s], as far as that is known
 
     def start(self, snapshot: Snapshot) -> None:
         """Begin from the measured state."""

@@ -52,15 +52,10 @@ _VECTORS: Mapping[str, tuple[tuple[str, ...], str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Dataset:
-    """What ``record`` has written, in the order of the episodes.
+    """What ``record`` has written, in the order of the episodes."""
 
-    Attributes:
-        columns: by name; the first axis is that of the rows.
-        about: task, units and order of the columns, rate [1/s], gains, versions.
-    """
-
-    columns: Arrays
-    about: Mapping[str, Any]
+    columns: Arrays  #: by name; the first axis is that of the rows
+    about: Mapping[str, Any]  #: task, units and order of the columns, rate [1/s], gains, versions
 
     __repr__ = brief
 

@@ -38,22 +38,15 @@ Arrays = Mapping[str, np.ndarray]
 
 @dataclass(frozen=True, slots=True)
 class Expert:
-    """What the expert does in an episode, and where.
+    """What the expert does in an episode, and where."""
 
-    Attributes:
-        task: commands, world, ground and pushes; actions are never delayed.
-        gait: in which it walks.
-        archive: of a motion's plan (``sweeps.motion_study.archive_of``), which it plays instead.
-        duration: of a walk [s].
-        kp, kd: of the servo for which joint targets are meant [N m/rad], [N m s/rad].
-    """
-
-    task: LearningTask
-    gait: str = "trot"
+    task: LearningTask  #: commands, world, ground and pushes; actions are never delayed
+    gait: str = "trot"  #: in which it walks
     archive: bytes = b""
-    duration: float = EPISODE
-    kp: float = KP
-    kd: float = KD
+    """Of a motion's plan (``sweeps.motion_study.archive_of``), which it plays instead."""
+    duration: float = EPISODE  #: of a walk [s]
+    kp: float = KP  #: of the servo for which joint targets are meant [N m/rad]
+    kd: float = KD  #: of the same [N m s/rad]
 
     def episode(self, seed: int) -> Arrays:
         """The rows of an episode that is drawn from ``seed``; they end where the robot falls.

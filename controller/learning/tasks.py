@@ -15,8 +15,7 @@ from go2_wbc.plant.terrain import Boxes, Terrain
 from go2_wbc.records import Array3
 from go2_wbc.world import DOUBTFUL, World
 
-Range = tuple[float, float]
-"""Least and greatest value; drawn evenly."""
+Range = tuple[float, float]  #: Least and greatest value; drawn evenly
 
 _FRICTION = sum(FRICTION_RANGE) / 2.0
 WORLD = World(
@@ -54,17 +53,11 @@ class Commands:
 
 @dataclass(frozen=True, slots=True)
 class Shoves:
-    """Pushes on the trunk, from any side, on the level.
+    """Pushes on the trunk, from any side, on the level."""
 
-    Attributes:
-        every: time [s] from one to the next.
-        impulse: of each [N s].
-        duration: of each [s].
-    """
-
-    every: Range = (2.0, 5.0)
-    impulse: Range = (3.0, 15.0)
-    duration: float = PUSH_TIME
+    every: Range = (2.0, 5.0)  #: time [s] from one to the next
+    impulse: Range = (3.0, 15.0)  #: of each [N s]
+    duration: float = PUSH_TIME  #: of each [s]
 
     def draw(self, rng: np.random.Generator) -> Array3:
         """The force of one [N]."""

@@ -65,23 +65,14 @@ class Course:
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """What came of a round.
+    """What came of a round."""
 
-    Attributes:
-        number: from 1 on.
-        share: of the time in which the teacher moved the robot.
-        stayed_up: mean time [s] for which the robot did, of ``EPISODE``.
-        samples: so far.
-        error: root mean square [rad] by which the network misses its labels.
-        network: as it is now.
-    """
-
-    number: int
-    share: float
-    stayed_up: float
-    samples: int
-    error: float
-    network: Network
+    number: int  #: from 1 on
+    share: float  #: of the time in which the teacher moved the robot
+    stayed_up: float  #: mean time [s] for which the robot did, of ``EPISODE``
+    samples: int  #: so far
+    error: float  #: root mean square [rad] by which the network misses its labels
+    network: Network  #: as it is now
 
 
 EPISODE = 20.0  #: Longest time [s] that a robot trots before another one begins

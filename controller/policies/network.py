@@ -17,8 +17,7 @@ from jaxtyping import Float
 from go2_wbc.errors import MissingDependency, install_line
 
 BETA = 0.9, 0.999  #: Of Adam's means of the gradient, and of its square
-LEAST_DEVIATION = 1e-3
-"""Of an input: what never changes is not blown up."""
+LEAST_DEVIATION = 1e-3  #: Of an input: what never changes is not blown up
 BATCH = 512
 
 Samples = Float[np.ndarray, "k n"]

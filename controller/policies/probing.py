@@ -52,19 +52,12 @@ sidecar of a policy that nobody trained it was 1.53; of 70 wrong ones of the clo
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A sidecar in which one thing is changed.
+    """A sidecar in which one thing is changed."""
 
-    Attributes:
-        key: of what is, in the file.
-        told: how it then reads.
-        sidecar: with the change.
-        factor: of a number that is multiplied, else 0.
-    """
-
-    key: str
-    told: str
-    sidecar: Sidecar
-    factor: float = 0.0
+    key: str  #: of what is, in the file
+    told: str  #: how it then reads
+    sidecar: Sidecar  #: with the change
+    factor: float = 0.0  #: of a number that is multiplied, else 0
 
     __repr__ = brief
 

@@ -44,42 +44,30 @@ SIZES = {
 """What an observation may hold, and how many numbers; of a clock for each of its offsets."""
 LAYOUTS = ("frames", "terms")
 RANGES = ("forward", "lateral", "turning")
-RATES = 10.0, 500.0
-"""Least and greatest rate [Hz] of a policy."""
+RATES = 10.0, 500.0  #: Least and greatest rate [Hz] of a policy
 MOST_HISTORY = 100
 
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """A part of the observation.
+    """A part of the observation."""
 
-    Attributes:
-        name: a key of ``SIZES``.
-        scale: of each of its numbers.
-        frequency: of a clock [Hz].
-        offsets: of a clock: for each one sine and cosine of its phase plus it.
-    """
-
-    name: str
-    scale: Float[np.ndarray, " n"]
-    frequency: float = 0.0
+    name: str  #: a key of ``SIZES``
+    scale: Float[np.ndarray, " n"]  #: of each of its numbers
+    frequency: float = 0.0  #: of a clock [Hz]
     offsets: tuple[float, ...] = ()
+    """Of a clock: for each one sine and cosine of its phase plus it."""
 
     __repr__ = brief
 
 
 @dataclass(frozen=True, slots=True)
 class CommandRanges:
-    """Commands that a policy has been trained on: of each speed the least and the greatest.
+    """Commands that a policy has been trained on: of each speed the least and the greatest."""
 
-    Attributes:
-        forward, lateral: speeds ahead and to the left [m/s].
-        turning: turning rate to the left [rad/s].
-    """
-
-    forward: tuple[float, float]
-    lateral: tuple[float, float]
-    turning: tuple[float, float]
+    forward: tuple[float, float]  #: speed ahead [m/s]
+    lateral: tuple[float, float]  #: speed to the left [m/s]
+    turning: tuple[float, float]  #: turning rate to the left [rad/s]
 
     def clip(self, command: VelocityCommand) -> VelocityCommand:
         """``command``, each speed within its range; no command stays none."""

@@ -9,11 +9,9 @@ from numbers import Real
 from go2_wbc.errors import CommandError
 from go2_wbc.validation import POSITIVE, ranged
 
-ROUNDING = 1e-12
-"""Share of the envelope by which a command on its surface may seem to lie outside."""
+ROUNDING = 1e-12  #: Share of the envelope by which a command on its surface may seem to lie outside
 
-FAR = 2.0
-"""How many times the envelope from which on other units may be meant."""
+FAR = 2.0  #: How many times the envelope from which on other units may be meant
 
 
 def finite_number(name: str, value: float) -> float:

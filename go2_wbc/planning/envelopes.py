@@ -25,14 +25,10 @@ from go2_wbc.robot.description import RobotProfile, find_profile
 
 FILE = Path(__file__).with_name("envelopes.json")
 """Written by ``python -m benchmarks envelopes --store``."""
-AUTO = "auto"
-"""What ``walk`` calls a gait that is chosen by the speed."""
-LADDER = ("walk", "trot", "flying_trot")
-"""Names of the gaits, the slowest first."""
-UP, DOWN = 0.85, 0.6
-"""Shares of the slower gait's envelope (own choice)."""
-DWELL = 0.8
-"""Time [s] from one change to the next at the least (own choice: two strides or more)."""
+AUTO = "auto"  #: What ``walk`` calls a gait that is chosen by the speed
+LADDER = ("walk", "trot", "flying_trot")  #: Names of the gaits, the slowest first
+UP, DOWN = 0.85, 0.6  #: Shares of the slower gait's envelope (own choice)
+DWELL = 0.8  #: Time [s] from one change to the next at the least (own choice: two strides or more)
 
 
 @cache

@@ -16,8 +16,7 @@ from go2_wbc.planning.trunk import Trunk, gained, heading, world_velocity
 from go2_wbc.planning.walk import Planner, Walk
 from go2_wbc.robot.state import Snapshot
 
-_TINY = 1e-9
-"""Length [m] that stands in for zero where one divides by it."""
+_TINY = 1e-9  #: Length [m] that stands in for zero where one divides by it
 
 
 @subroutine

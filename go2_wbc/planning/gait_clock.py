@@ -37,10 +37,8 @@ DUTY_FALL = 4.0
 is not put back. At 0.5 a push of 50 N s ahead threw a trot of 0.5 m/s over feet that stood on."""
 SEEN_STRIDE = Stride(reach=0.25, stance_min=0.25, stance_max=0.25, swing=0.25, swing_slope=0.0)
 """Of a trot on uneven ground that is seen."""
-Phases = tuple[float, float, float, float]
-"""At which the feet touch down, of FL, FR, RL and RR."""
-_RESOLUTION = 1e12
-"""Of phases, that adding and dividing may have blurred, in steps a turn."""
+Phases = tuple[float, float, float, float]  #: At which the feet touch down, of FL, FR, RL and RR
+_RESOLUTION = 1e12  #: Of phases, that adding and dividing may have blurred, in steps a turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,23 +58,14 @@ class GaitForm:
 
 @dataclass(frozen=True, slots=True)
 class Cadence:
-    """Which gait is wanted.
+    """Which gait is wanted."""
 
-    Attributes:
-        wanted: its form, where it does not follow the speed.
-        rest: the one in which the robot starts and comes to rest.
-        stride: how period and duty follow the speed.
-        rough_stride: the same on rough ground.
-        seen_stride: the same on uneven ground that is seen.
-        follows_speed: whether they do.
-    """
-
-    wanted: GaitForm
-    rest: GaitForm
-    stride: Stride
-    rough_stride: Stride
-    seen_stride: Stride
-    follows_speed: bool
+    wanted: GaitForm  #: its form, where it does not follow the speed
+    rest: GaitForm  #: the one in which the robot starts and comes to rest
+    stride: Stride  #: how period and duty follow the speed
+    rough_stride: Stride  #: the same on rough ground
+    seen_stride: Stride  #: the same on uneven ground that is seen
+    follows_speed: bool  #: whether they do
 
     @staticmethod
     def of(gait: Gait, rough: RoughConfig | None = None) -> Cadence:
@@ -89,24 +78,16 @@ class Cadence:
 
 
 class Clock(Record):
-    """Phase and form of the gait.
+    """Phase and form of the gait."""
 
-    Attributes:
-        time: since the stride's start or a whole number of strides before [s].
-        period, duty, offsets, width: form of the gait as it is now.
-        goal: offsets to which those of now were aligned.
-        is_rough: whether its strides are those on rough ground.
-        is_seen: whether they are those on uneven ground that is seen.
-    """
-
-    time: float
-    period: float
-    duty: float
-    offsets: Float[np.ndarray, "4"]
-    width: float
-    goal: Float[np.ndarray, "4"]
-    is_rough: bool
-    is_seen: bool
+    time: float  #: since the stride's start or a whole number of strides before [s]
+    period: float  #: [s] of the gait as it is now, whose form the next three are, too
+    duty: float  #: of the same
+    offsets: Float[np.ndarray, "4"]  #: of the same
+    width: float  #: of the same
+    goal: Float[np.ndarray, "4"]  #: offsets to which those of now were aligned
+    is_rough: bool  #: whether its strides are those on rough ground
+    is_seen: bool  #: whether they are those on uneven ground that is seen
 
 
 def resting_gait(gait: Gait) -> Gait:

@@ -50,21 +50,16 @@ is believed 0.5 deg wrong is a slope that is not there, along which the plane is
 landings: at 1 m/s it was up to 7 mm too high with 0.3, 3 mm with 0.5."""
 LEAST_DETERMINANT = 1e-4
 """Of the feet's second moments [m^4], 0.01 when they stand squarely; below it they are in line."""
-MOST_SLOPE = 0.6
-"""Greatest slope that is believed; no foot holds on a steeper one."""
+MOST_SLOPE = 0.6  #: Greatest slope that is believed; no foot holds on a steeper one
 LEVEL_SLOPE = 0.05
 """Slope up to which the ground counts as level for the friction; from twice that on in full."""
-SLOPE_SHARE = 0.3
-"""Share of the slope that was found at a landing that is taken in."""
-ROUGH_SLOPE_SHARE = 0.5
-"""The same on rough ground."""
-FOLLOW = 0.7
-"""Share of the slope by which the trunk is tilted."""
+SLOPE_SHARE = 0.3  #: Share of the slope that was found at a landing that is taken in
+ROUGH_SLOPE_SHARE = 0.5  #: The same on rough ground
+FOLLOW = 0.7  #: Share of the slope by which the trunk is tilted
 SMOOTH, MOST_RAISE = 0.015, 0.05
 """Distance [m] of a landing from the plane up to which the ground is smooth. As much as it is
 rougher than that is added to the apex of a swing, the latter [m] at most."""
-ROUGH = 0.03
-"""Roughness [m] from which on ground is rough."""
+ROUGH = 0.03  #: Roughness [m] from which on ground is rough
 ROUGH_PACE = 0.85
 """Speed [m/s] up to which that holds; as much faster, as much rougher: a robot at 3 m/s whose foot
 brushes the ground once in a swing goes on."""
@@ -90,12 +85,9 @@ the robot falls. Faster aside, the foot that comes down strikes the one beside i
 QUICK, FAST, FAST_HASTE = 2.0, 2.6, 0.2
 """The same by the speed [m/s]: motors that turn fast have less torque, and the trunk sinks where it
 is asked for more."""
-ROUGH_HASTE = 1.0 / 7.0
-"""Share of the accelerations that is left there."""
-CALMING = 0.8
-"""Share of the roughness that is left after a landing."""
-STUMBLE = 0.06
-"""Roughness [m] that a foot tells which is stopped in the middle of its swing."""
+ROUGH_HASTE = 1.0 / 7.0  #: Share of the accelerations that is left there
+CALMING = 0.8  #: Share of the roughness that is left after a landing
+STUMBLE = 0.06  #: Roughness [m] that a foot tells which is stopped in the middle of its swing
 DELAY = 0.4
 """Share of a swing, on the roughest ground, in which the foot only rises: feet close to a step
 rubbed along its face. It and the six before are from a search in simulation."""
@@ -109,13 +101,11 @@ MOST_STEEPNESS = 0.35
 says nothing of the friction."""
 FRICTION_FALL_TIME, FRICTION_RISE = 0.03, 0.1
 """Time constant [s] of the fall, and rate [1/s] of the rise."""
-LEAST_FRICTION, MOST_FRICTION = 0.12, 0.6
-"""Bounds of the estimate."""
+LEAST_FRICTION, MOST_FRICTION = 0.12, 0.6  #: Bounds of the estimate
 HALF_SPEED = 0.5
 """Speed [m/s] of a sliding contact point at which the ground bears half of the force along it that
 the torques make."""
-_TINY = 1e-9
-"""Force [N], over a determinant, that stands in for none where one divides by it."""
+_TINY = 1e-9  #: Force [N], over a determinant, that stands in for none where one divides by it
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,35 +152,20 @@ class RoughConfig:
 
 
 class Ground(Record):
-    """What is known of the ground.
+    """What is known of the ground."""
 
-    Attributes:
-        height: below the CoM [m].
-        slope: ahead and to the left, in the world's axes.
-        p_seen: where the CoM is [m].
-        p_met: where each foot met it last, by its centre [m].
-        roughness: distance [m] from the plane at which feet were met lately.
-        rough_way: for how far [m] it is taken for rough yet.
-        high_way: for how far [m] steps are taken for high yet.
-        steeper: share of the slope by which the trunk follows it more.
-        rise_way: for how far [m] steps up are expected yet.
-        ramp_way: for how far [m] a slope is taken for that of a ramp yet, not of stairs.
-        lift: height [m] by which the trunk is carried higher for these.
-        lean: slope that the trunk follows besides, to raise its leading end.
-    """
-
-    height: float
-    slope: Float[np.ndarray, "2"]
-    p_seen: Float[np.ndarray, "2"]
-    p_met: Float[np.ndarray, "4 3"]
-    roughness: float
-    rough_way: float
-    high_way: float
-    steeper: float
-    rise_way: float
-    ramp_way: float
-    lift: float
-    lean: Float[np.ndarray, "2"]
+    height: float  #: below the CoM [m]
+    slope: Float[np.ndarray, "2"]  #: ahead and to the left, in the world's axes
+    p_seen: Float[np.ndarray, "2"]  #: where the CoM is [m]
+    p_met: Float[np.ndarray, "4 3"]  #: where each foot met it last, by its centre [m]
+    roughness: float  #: distance [m] from the plane at which feet were met lately
+    rough_way: float  #: for how far [m] it is taken for rough yet
+    high_way: float  #: for how far [m] steps are taken for high yet
+    steeper: float  #: share of the slope by which the trunk follows it more
+    rise_way: float  #: for how far [m] steps up are expected yet
+    ramp_way: float  #: for how far [m] a slope is taken for that of a ramp yet, not of stairs
+    lift: float  #: height [m] by which the trunk is carried higher for these
+    lean: Float[np.ndarray, "2"]  #: slope that the trunk follows besides, to raise its leading end
 
 
 def ground_below(now: Snapshot, foot_radius: float) -> Ground:
@@ -423,20 +398,14 @@ def note_stumble(g: Ground) -> None:
 
 
 class Slip(Record):
-    """What the feet have shown.
+    """What the feet have shown."""
 
-    Attributes:
-        friction: the estimate.
-        loaded: time [s] for which each foot has stood.
-        sliding: time [s] for which it has slid.
-        has_slid: whether a foot has, and has shown less than the greatest estimate, since that
-            was the estimate.
-    """
-
-    friction: float
+    friction: float  #: the estimate
     has_slid: bool
-    loaded: Float[np.ndarray, "4"]
-    sliding: Float[np.ndarray, "4"]
+    """Whether a foot has, and has shown less than the greatest estimate, since that was the
+    estimate."""
+    loaded: Float[np.ndarray, "4"]  #: time [s] for which each foot has stood
+    sliding: Float[np.ndarray, "4"]  #: time [s] for which it has slid
 
 
 @subroutine

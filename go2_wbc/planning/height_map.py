@@ -32,18 +32,15 @@ from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.records import Array3, Array3x3, ArrayNx3, Record
 from go2_wbc.robot.state import Snapshot
 
-CELL, CELLS = 0.025, 160
-"""Side of a cell [m], and how many cells the map is long and wide: 4 m."""
-_STRIDE = 2.0**20
-"""Between the names of two rows."""
+CELL, CELLS = 0.025, 160  #: Side of a cell [m], and how many cells the map is long and wide: 4 m
+_STRIDE = 2.0**20  #: Between the names of two rows
 LAYER, JUMP, DOWNS = 0.05, 0.05, 4
 """Depth [m] of the points that count, height [m] beyond which a cell has jumped, and the scans in
 a row after which a jump down is believed."""
 DRIFT = 1.6e-5
 """Variance [m^2] that a scan adds before it is taken in: 4 mm of the height that the robot believes
 to have, so that newer scans carry the map along."""
-LEAST_VARIANCE = 1e-6
-"""Of a scan's point [m^2]: 1 mm."""
+LEAST_VARIANCE = 1e-6  #: Of a scan's point [m^2]: 1 mm
 REACH, TALLEST = 1.9, 0.5
 """Distance [m] ahead and aside, and height [m] over the base, beyond which a point is left out: the
 map reaches no farther, and what is higher is no ground."""
@@ -56,29 +53,19 @@ than a round one. Without it feet and scans pull the map to and fro."""
 
 
 class HeightMap(Record):
-    """What is known of the ground around the robot.
+    """What is known of the ground around the robot."""
 
-    Attributes:
-        is_used: whether there has been a scan.
-        shift: what is added to every height [m]; see the module.
-        stood: time [s] for which each foot has stood.
-        name: of the cell that a place of the ring holds; 0 for none.
-        height: of the cells [m].
-        variance: of the heights [m^2].
-        lower: how many scans in a row have found a cell lower than it is believed.
-        highest, total, count: of a scan's points, while it is taken in.
-    """
-
-    is_used: bool
-    shift: float
-    stood: Float[np.ndarray, "4"]
-    name: Float[np.ndarray, "160 160"]
-    height: Float[np.ndarray, "160 160"]
-    variance: Float[np.ndarray, "160 160"]
+    is_used: bool  #: whether there has been a scan
+    shift: float  #: what is added to every height [m]; see the module
+    stood: Float[np.ndarray, "4"]  #: time [s] for which each foot has stood
+    name: Float[np.ndarray, "160 160"]  #: of the cell that a place of the ring holds; 0 for none
+    height: Float[np.ndarray, "160 160"]  #: of the cells [m]
+    variance: Float[np.ndarray, "160 160"]  #: of the heights [m^2]
     lower: Float[np.ndarray, "160 160"]
-    highest: Float[np.ndarray, "160 160"]
-    total: Float[np.ndarray, "160 160"]
-    count: Float[np.ndarray, "160 160"]
+    """How many scans in a row have found a cell lower than it is believed."""
+    highest: Float[np.ndarray, "160 160"]  #: of a scan's points, while it is taken in
+    total: Float[np.ndarray, "160 160"]  #: of the same
+    count: Float[np.ndarray, "160 160"]  #: of the same
 
 
 @subroutine

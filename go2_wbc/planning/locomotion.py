@@ -101,8 +101,7 @@ from go2_wbc.robot.state import Snapshot
 __all__ = ["GREATEST_HEIGHT", "LEAST_HEIGHT", "LocomotionConfig", "LocomotionPlanner"]
 
 LONGEST_DELAY = 1.0  # of commands [s]
-DELAY_STAYS = 10.0
-"""Time [s] for which commands count as late after they were."""
+DELAY_STAYS = 10.0  #: Time [s] for which commands count as late after they were
 MID_SWING = 0.2
 """Share of a swing before and after its middle in which a foot that has contact stumbles."""
 

@@ -37,12 +37,9 @@ from go2_wbc.compilation import subroutine
 from go2_wbc.records import Record
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, Retired, ranged, retires
 
-NODES = 12
-"""Nodes of the horizon."""
-STEP = 0.03
-"""Length [s] of a node."""
-INTERVAL = 0.01
-"""Time [s] from one solution to the next."""
+NODES = 12  #: Nodes of the horizon
+STEP = 0.03  #: Length [s] of a node
+INTERVAL = 0.01  #: Time [s] from one solution to the next
 
 
 @typed()
@@ -100,29 +97,19 @@ class Horizon(Record):
     """What the MPC looks at, and the forces that it finds; the first axis of all is the node.
 
     Pose is the turn [rad] and the CoM [m], rate are w [rad/s] and v [m/s], both in this order.
-
-    Attributes:
-        mass, gravity: of the rigid body [kg], [m/s^2].
-        inertia: about its CoM, world axes [kg m^2].
-        friction: mu of the friction pyramid.
-        state: pose and rate now.
-        goals: pose and rate wanted at the end of each node.
-        share: of each node that each foot stands.
-        landings: in how many strides each foot will have landed; at most 0 while it stands as now.
-        arms: from the CoM to the feet's contact points [m].
-        forces: mean forces [N] of the feet over each node.
     """
 
-    mass: float
-    gravity: float
-    inertia: Float[np.ndarray, "3 3"]
-    friction: float
-    state: Float[np.ndarray, "12"]
-    goals: Float[np.ndarray, "12 12"]
-    share: Float[np.ndarray, "12 4"]
+    mass: float  #: of the rigid body [kg]
+    gravity: float  #: [m/s^2]
+    inertia: Float[np.ndarray, "3 3"]  #: about its CoM, world axes [kg m^2]
+    friction: float  #: mu of the friction pyramid
+    state: Float[np.ndarray, "12"]  #: pose and rate now
+    goals: Float[np.ndarray, "12 12"]  #: pose and rate wanted at the end of each node
+    share: Float[np.ndarray, "12 4"]  #: of each node that each foot stands
     landings: Float[np.ndarray, "12 4"]
-    arms: Float[np.ndarray, "12 4 3"]
-    forces: Float[np.ndarray, "12 4 3"]
+    """In how many strides each foot will have landed; at most 0 while it stands as now."""
+    arms: Float[np.ndarray, "12 4 3"]  #: from the CoM to the feet's contact points [m]
+    forces: Float[np.ndarray, "12 4 3"]  #: mean forces [N] of the feet over each node
 
 
 @subroutine

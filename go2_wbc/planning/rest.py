@@ -33,12 +33,9 @@ REST_REACH = 0.08
 """Distance [m] of a foot from below its hip within which a stance is held. Legs bear 0.22."""
 REST_MARGIN = 0.05
 """Distance [m] of the capture point inside the feet's polygon; amid square feet it is 0.14."""
-SHIFT = 0.02
-"""Distance [m] from the feet's middle within which the trunk comes to rest."""
-SHIFT_SPEED = 0.01
-"""Speed [m/s] at which it goes there."""
-_AROUND = (0, 2, 3, 1)
-"""The legs counter-clockwise: FL, RL, RR, FR."""
+SHIFT = 0.02  #: Distance [m] from the feet's middle within which the trunk comes to rest
+SHIFT_SPEED = 0.01  #: Speed [m/s] at which it goes there
+_AROUND = (0, 2, 3, 1)  #: The legs counter-clockwise: FL, RL, RR, FR
 
 
 @kernel

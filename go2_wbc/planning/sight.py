@@ -30,25 +30,18 @@ from go2_wbc.robot.state import Snapshot
 
 BEHIND, AHEAD, ASIDE, GRID = -0.35, 0.45, 0.225, 0.05
 """Ground [m] that the plane fits, from the CoM, and the distance of its samples."""
-LANDING_WEIGHT = 3.0
-"""Of a landing, beside that of a sample."""
-LEAST_KNOWN = 0.5
-"""Share of the samples that must be known."""
-STEEPEST = 0.75
-"""Greatest slope that is believed: that of stairs of 23 cm."""
+LANDING_WEIGHT = 3.0  #: Of a landing, beside that of a sample
+LEAST_KNOWN = 0.5  #: Share of the samples that must be known
+STEEPEST = 0.75  #: Greatest slope that is believed: that of stairs of 23 cm
 AGAIN, SMOOTH_TIME = 0.02, 0.12
 """Time [s] between two looks, and time constant [s] with which the trunk follows the plane."""
-PIT = 0.24
-"""Height [m] below, or above, all feet from which on ground is none to stand on."""
+PIT = 0.24  #: Height [m] below, or above, all feet from which on ground is none to stand on
 UNEVEN, UNEVEN_WAY = 0.04, 0.4
 """Height [m] of a step on ``GRID`` from which on ground is uneven, and for how far [m] that is
 remembered."""
-LOOK = 1.1
-"""How far ahead [m] uneven ground counts."""
-SPEED, FLIGHT_SPEED = 0.43, 0.32
-"""Greatest speed [m/s] on it, and on a flight of stairs: of"""
-FLIGHT, FLIGHT_STEP = 3, 0.13
-"""so many steps in sight, and higher than that [m]."""
+LOOK = 1.1  #: How far ahead [m] uneven ground counts
+SPEED, FLIGHT_SPEED = 0.43, 0.32  #: Greatest speed [m/s] on it, and on a flight of stairs: of
+FLIGHT, FLIGHT_STEP = 3, 0.13  #: so many steps in sight, and higher than that [m]
 LOWERED, LIFT, LIFT_RATE = 0.15, 0.045, 0.1
 """Fall of the way, per metre, from which on it leads down; by how much [m] the trunk is higher on
 it, and how fast [m/s] it comes there."""
@@ -65,37 +58,23 @@ STOP, BRAKING = 0.60, 0.5
 NEAR_STOP, CERTAIN = 0.03, 0.7
 """Distance [m] from there at which it counts as stopped, and time [s] after which it says so: the
 first step down of a flight is seen later than the second."""
-RISE, DROP = 1.0, 2.0
-"""What ends a way: a step up or a wall, or a gap or a step down."""
+RISE, DROP = 1.0, 2.0  #: What ends a way: a step up or a wall, or a gap or a step down
 _TINY = 1e-9
 
 
 class Sight(Record):
-    """What a walk has seen.
+    """What a walk has seen."""
 
-    Attributes:
-        since: for how long [s] it has not looked.
-        sees: whether the ground below the trunk is known.
-        plane: height [m] below the CoM and slope of the ground.
-        most: greatest speed [m/s] that the way permits.
-        uneven_way: for how far [m] the ground is taken for uneven yet.
-        lift: height [m] by which the trunk is carried higher.
-        blocked: what ends the way ahead, 0 for nothing.
-        end: how far ahead [m] of the CoM that is.
-        stopped: for how long [s] it has been so near that the robot has stopped.
-        is_slowed: whether the robot is told less than it was asked for.
-    """
-
-    since: float
-    sees: bool
-    plane: Array3
-    most: float
-    uneven_way: float
-    lift: float
-    blocked: float
-    end: float
-    stopped: float
-    is_slowed: bool
+    since: float  #: for how long [s] it has not looked
+    sees: bool  #: whether the ground below the trunk is known
+    plane: Array3  #: height [m] below the CoM and slope of the ground
+    most: float  #: greatest speed [m/s] that the way permits
+    uneven_way: float  #: for how far [m] the ground is taken for uneven yet
+    lift: float  #: height [m] by which the trunk is carried higher
+    blocked: float  #: what ends the way ahead, 0 for nothing
+    end: float  #: how far ahead [m] of the CoM that is
+    stopped: float  #: for how long [s] it has been so near that the robot has stopped
+    is_slowed: bool  #: whether the robot is told less than it was asked for
 
     @property
     def why_blocked(self) -> str:

@@ -39,26 +39,19 @@ from go2_wbc.planning.ground import Ground, RoughConfig, apex_raise, delay, is_r
 from go2_wbc.records import Array3, Record
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
-EARLIEST = 0.7
-"""Share of the swing from which on a contact may be a landing."""
+EARLIEST = 0.7  #: Share of the swing from which on a contact may be a landing
 STEP = 0.015
 """Height [m] above the ground from which on it is one. Both are from a search in simulation."""
 
 
 class FootContact(Record):
-    """What is known of a foot's contact.
+    """What is known of a foot's contact."""
 
-    Attributes:
-        is_early: whether it stands ahead of its plan.
-        since: for how long [s] it has done so; infinite if it has come down when it was planned to.
-        was_stance: whether it was planned to stand at the tick before.
-        is_awaited: whether it shall stand and has not met the ground yet.
-    """
-
-    is_early: bool
+    is_early: bool  #: whether it stands ahead of its plan
     since: float
-    was_stance: bool
-    is_awaited: bool
+    """For how long [s] it has done so; infinite if it has come down when it was planned to."""
+    was_stance: bool  #: whether it was planned to stand at the tick before
+    is_awaited: bool  #: whether it shall stand and has not met the ground yet
 
 
 @subroutine
@@ -117,44 +110,27 @@ class SwingConfig:
 
 
 class Swing(Record):
-    """How the swing of one foot has begun.
+    """How the swing of one foot has begun."""
 
-    Attributes:
-        start: where the foot was [m].
-        raised: height [m] by which its apex is higher than on smooth ground.
-        delay: share of it in which the foot only rises.
-        begun: share of the gait's swing that had passed by then.
-        peak: share of it at which the foot is highest; 0 until that is settled, at its first tick.
-    """
-
-    start: Array3
-    raised: float
-    delay: float
-    begun: float
+    start: Array3  #: where the foot was [m]
+    raised: float  #: height [m] by which its apex is higher than on smooth ground
+    delay: float  #: share of it in which the foot only rises
+    begun: float  #: share of the gait's swing that had passed by then
     peak: float
+    """Share of it at which the foot is highest; 0 until that is settled, at its first tick."""
 
 
 class Step(Record):
-    """Where and how a foot swings that is placed by sight; see ``sighted_steps``.
+    """Where and how a foot swings that is placed by sight; see ``sighted_steps``."""
 
-    Attributes:
-        is_sighted: whether this swing is.
-        next: when [s] the foothold is chosen again.
-        chosen: the foothold, for the centre of the foot [m].
-        goal: where the foot is led, on its way there [m].
-        top: greatest height of the swing [m].
-        peak: share of the swing at which it is there.
-        begin, end: shares between which the foot goes ahead.
-    """
-
-    is_sighted: bool
-    next: float
-    chosen: Array3
-    goal: Array3
-    top: float
-    peak: float
-    begin: float
-    end: float
+    is_sighted: bool  #: whether this swing is
+    next: float  #: when [s] the foothold is chosen again
+    chosen: Array3  #: the foothold, for the centre of the foot [m]
+    goal: Array3  #: where the foot is led, on its way there [m]
+    top: float  #: greatest height of the swing [m]
+    peak: float  #: share of the swing at which it is there
+    begin: float  #: share from which on the foot goes ahead
+    end: float  #: share until which it does
 
 
 @subroutine

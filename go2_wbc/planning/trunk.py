@@ -43,8 +43,7 @@ from go2_wbc.reference import Target
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
-RATE = 2.0
-"""Share of the remaining error that is added per second [1/s]."""
+RATE = 2.0  #: Share of the remaining error that is added per second [1/s]
 POSITION_LIMIT, POSITION_WINDOW = 0.06, 0.04
 """Greatest correction [m] per axis, and the error [m] beyond which one counts as this."""
 ANGLE_LIMIT, ANGLE_WINDOW = 0.3, 0.3
@@ -60,27 +59,18 @@ STRIDE_RATE, STRIDE_WINDOW = 1.0, 0.05
 believed 2 cm beside their place, as gravity is known to 1 deg, leaned a trot by 4 deg. A robot that
 stands ready does it as a motion does: the joints' friction leaves 2.5 deg of a pose undone, and a
 payload that reaches farther than is believed leans it by 4 deg."""
-LEAN_LIMIT = 0.15
-"""Greatest lean [rad] that is taken out."""
-_TINY = 1e-9
-"""Velocity [m/s] that stands in for none where one divides by it."""
+LEAN_LIMIT = 0.15  #: Greatest lean [rad] that is taken out
+_TINY = 1e-9  #: Velocity [m/s] that stands in for none where one divides by it
 
 
 @dataclass(frozen=True, slots=True)
 class BodyPose:
-    """Of the trunk, from that of one that walks level, facing ahead.
+    """Of the trunk, from that of one that walks level, facing ahead."""
 
-    Attributes:
-        height: above the walking height [m], negative is lower.
-        roll: positive lowers the right side [rad].
-        pitch: positive lowers the front [rad].
-        yaw: positive looks to the left of the heading [rad].
-    """
-
-    height: float = 0.0
-    roll: float = 0.0
-    pitch: float = 0.0
-    yaw: float = 0.0
+    height: float = 0.0  #: above the walking height [m], negative is lower
+    roll: float = 0.0  #: positive lowers the right side [rad]
+    pitch: float = 0.0  #: positive lowers the front [rad]
+    yaw: float = 0.0  #: positive looks to the left of the heading [rad]
 
     def __post_init__(self) -> None:
         """Make every component a float; raise CommandError unless it is a finite number."""
@@ -93,8 +83,7 @@ class BodyPose:
         return np.array([self.height, self.roll, self.pitch, self.yaw])
 
 
-LEVEL = BodyPose()
-"""The pose of a robot that walks and is asked for nothing else."""
+LEVEL = BodyPose()  #: The pose of a robot that walks and is asked for nothing else
 
 
 @typed()
@@ -209,41 +198,27 @@ def pose_turn(yaw: float, pose: Array4, rate: Array4, turn: Array3, w: Array3) -
 
 
 class Command(Record):
-    """What the planner is asked for.
+    """What the planner is asked for."""
 
-    Attributes:
-        velocity: ahead, left [m/s], turning [rad/s], in the heading frame.
-        pose: of the trunk: height [m], roll, pitch, yaw [rad]; see ``BodyPose``.
-    """
-
-    velocity: Array3
-    pose: Array4
+    velocity: Array3  #: ahead, left [m/s], turning [rad/s], in the heading frame
+    pose: Array4  #: of the trunk: height [m], roll, pitch, yaw [rad]; see ``BodyPose``
 
 
 class Trunk(Record):
-    """Where the trunk shall be.
+    """Where the trunk shall be."""
 
-    Attributes:
-        yaw: heading [rad].
-        position: of the CoM, on the level [m].
-        velocity: ramped command in the heading frame [m/s], [rad/s].
-        missing: what of the command ahead and to the left has yet to be ramped [m/s].
-        acceleration: at which that happens, smoothed, in the heading frame [m/s^2].
-        height_offset: what is added to the wanted height against a load [m].
-        lean_offset: turn about x and y of the world [rad] that is added against the lean.
-        pose: on top of walking level: height [m], roll, pitch, yaw [rad].
-        pose_rate: of these, per second.
-    """
-
-    yaw: float
-    position: Float[np.ndarray, "2"]
-    velocity: Array3
+    yaw: float  #: heading [rad]
+    position: Float[np.ndarray, "2"]  #: of the CoM, on the level [m]
+    velocity: Array3  #: ramped command in the heading frame [m/s], [rad/s]
     missing: Float[np.ndarray, "2"]
+    """What of the command ahead and to the left has yet to be ramped [m/s]."""
     acceleration: Float[np.ndarray, "2"]
-    height_offset: float
+    """At which that happens, smoothed, in the heading frame [m/s^2]."""
+    height_offset: float  #: what is added to the wanted height against a load [m]
     lean_offset: Float[np.ndarray, "2"]
-    pose: Array4
-    pose_rate: Array4
+    """Turn about x and y of the world [rad] that is added against the lean."""
+    pose: Array4  #: on top of walking level: height [m], roll, pitch, yaw [rad]
+    pose_rate: Array4  #: of these, per second
 
 
 @subroutine

@@ -24,8 +24,7 @@ from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Retired, past_table, ranged, retires
 
-LEAST_HEIGHT, GREATEST_HEIGHT = 0.18, 0.34
-"""CoM heights [m] between which the legs can step."""
+LEAST_HEIGHT, GREATEST_HEIGHT = 0.18, 0.34  #: CoM heights [m] between which the legs can step
 
 
 @typed()
@@ -137,31 +136,20 @@ class LocomotionConfig:
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """The numbers of a walk.
+    """The numbers of a walk."""
 
-    Attributes:
-        config: of the planner, with the apex of the gait's swing.
-        cadence: the gait.
-        height: of the CoM above where feet that stayed round would end [m].
-        mass: of the robot [kg].
-        gravity: [m/s^2].
-        foot_radius: [m].
-        p_base_feet_nominal: places of the feet below the hips, from the base [m].
-        stands_beside_com: whether at times only the feet of one side, or of one end, stand.
-        p_base_hips: where the thighs' axes meet the legs' planes, in the base frame [m].
-        link: length of a thigh, and of a calf [m].
-    """
-
-    config: LocomotionConfig
-    cadence: Cadence
-    height: float
-    mass: float
-    gravity: float
-    foot_radius: float
+    config: LocomotionConfig  #: of the planner, with the apex of the gait's swing
+    cadence: Cadence  #: the gait
+    height: float  #: of the CoM above where feet that stayed round would end [m]
+    mass: float  #: of the robot [kg]
+    gravity: float  #: [m/s^2]
+    foot_radius: float  #: [m]
     p_base_feet_nominal: Float[np.ndarray, "4 3"]
-    stands_beside_com: bool
+    """Places of the feet below the hips, from the base [m]."""
+    stands_beside_com: bool  #: whether at times only the feet of one side, or of one end, stand
     p_base_hips: Float[np.ndarray, "4 3"]
-    link: float
+    """Where the thighs' axes meet the legs' planes, in the base frame [m]."""
+    link: float  #: length of a thigh, and of a calf [m]
 
     @staticmethod
     def of(model: RobotModel, gait: Gait, config: LocomotionConfig) -> Walk:
@@ -190,44 +178,26 @@ class Foot(Record):
 
 
 class Rest(Record):
-    """How the robot comes to rest.
+    """How the robot comes to rest."""
 
-    Attributes:
-        landings: how often feet have come down since it has had no command.
-        place: where the CoM shall be while the robot rests [m].
-        middle: of the feet at the last tick at rest [m].
-    """
-
-    landings: float
-    place: Float[np.ndarray, "2"]
-    middle: Float[np.ndarray, "3"]
+    landings: float  #: how often feet have come down since it has had no command
+    place: Float[np.ndarray, "2"]  #: where the CoM shall be while the robot rests [m]
+    middle: Float[np.ndarray, "3"]  #: of the feet at the last tick at rest [m]
 
 
 class PlannedForces(Record):
-    """What the MPC has planned last.
+    """What the MPC has planned last."""
 
-    Attributes:
-        next: when [s] it plans again.
-        f_world_feet: force [N] of each foot while it stands.
-    """
-
-    next: float
-    f_world_feet: Float[np.ndarray, "4 3"]
+    next: float  #: when [s] it plans again
+    f_world_feet: Float[np.ndarray, "4 3"]  #: force [N] of each foot while it stands
 
 
 class Planner(Record):
-    """State of the locomotion planner.
+    """State of the locomotion planner."""
 
-    Attributes:
-        time: of the last tick [s].
-        is_stepping: whether the gait is running.
-        delay: after which commands act [s].
-        horizon: what the MPC has looked at last.
-    """
-
-    time: float
-    is_stepping: bool
-    delay: float
+    time: float  #: of the last tick [s]
+    is_stepping: bool  #: whether the gait is running
+    delay: float  #: after which commands act [s]
     clock: Clock
     trunk: Trunk
     ground: Ground
@@ -235,7 +205,7 @@ class Planner(Record):
     rest: Rest
     feet: tuple[Foot, Foot, Foot, Foot]
     planned: PlannedForces
-    horizon: Horizon
+    horizon: Horizon  #: what the MPC has looked at last
     sight: Sight
 
 

@@ -12,20 +12,15 @@ PLATFORM = 10.0  #: Length [m] of the level ground behind the last step
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A box that is fixed to the world.
+    """A box that is fixed to the world."""
 
-    Attributes:
-        centre, half_size: of the box, and half of its sides [m].
-        yaw: by which it is turned about z [rad].
-        pitch: by which it is turned about its own y axis before [rad]; positive lowers its +x end.
-        friction: sliding friction coefficient on it, in the place of the plant's; None for that.
-    """
-
-    centre: tuple[float, float, float]
-    half_size: tuple[float, float, float]
-    yaw: float = 0.0
+    centre: tuple[float, float, float]  #: [m]
+    half_size: tuple[float, float, float]  #: half of its sides [m]
+    yaw: float = 0.0  #: by which it is turned about z [rad]
     pitch: float = 0.0
+    """By which it is turned about its own y axis before [rad]; positive lowers its +x end."""
     friction: float | None = None
+    """Sliding friction coefficient on it, in the place of the plant's; None for that."""
 
     @staticmethod
     def slab(start: float, length: float, bottom: float, top: float) -> Block:

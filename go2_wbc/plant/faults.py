@@ -27,31 +27,23 @@ from go2_wbc.robot.sensor_watch import SensorWatch
 from go2_wbc.robot.state import RobotState, SensorReading
 
 AXES = ("x", "y", "z")
-HELD_TIME = 0.3
-"""Time [s] for which a foot is held."""
+HELD_TIME = 0.3  #: Time [s] for which a foot is held
 
 
 class FaultKind(StrEnum):
     """What can break; the value of each is said in brackets."""
 
-    MOTOR = "motor"
-    """A joint's motor gives a share of its torque [0: it is dead]."""
-    ENCODER = "encoder"
-    """A joint's encoder reads so much more than there is [0.1 rad]."""
-    ENCODER_STUCK = "encoder_stuck"
-    """A joint's encoder reads for ever what it read last."""
-    FOOT_FORCE = "foot_force"
-    """A foot's sensor reads this [0 N: it is dead]."""
-    GYRO = "gyro"
-    """The gyro reads so much more about an axis, x unless said [0.5 rad/s]."""
-    ACCELEROMETER = "accelerometer"
-    """The accelerometer, the same [1 m/s^2]."""
+    MOTOR = "motor"  #: A joint's motor gives a share of its torque [0: it is dead]
+    ENCODER = "encoder"  #: A joint's encoder reads so much more than there is [0.1 rad]
+    ENCODER_STUCK = "encoder_stuck"  #: A joint's encoder reads for ever what it read last
+    FOOT_FORCE = "foot_force"  #: A foot's sensor reads this [0 N: it is dead]
+    GYRO = "gyro"  #: The gyro reads so much more about an axis, x unless said [0.5 rad/s]
+    ACCELEROMETER = "accelerometer"  #: The accelerometer, the same [1 m/s^2]
     FOOT_HELD = "foot_held"
     """A foot is held where it is for ``HELD_TIME``, by so much force at the most [200 N]."""
     NOT_A_NUMBER = "not_a_number"
     """A joint's angle, a foot's force, or an axis of the gyro, is nan in one reading."""
-    LOST_PACKETS = "lost_packets"
-    """This share of the states does not arrive [0.05]."""
+    LOST_PACKETS = "lost_packets"  #: This share of the states does not arrive [0.05]
 
 
 _JOINTS: Mapping[str, int] = {name: index for index, name in enumerate(JOINT_NAMES)}
@@ -84,17 +76,12 @@ _VALUES: Mapping[FaultKind, float] = {
 
 @dataclass(frozen=True, slots=True)
 class InjectedFault:
-    """Something that breaks.
+    """Something that breaks."""
 
-    Attributes:
-        kind, part, at: what breaks how, and when [s].
-        value: see ``FaultKind``.
-    """
-
-    kind: FaultKind
-    part: str
-    at: float
-    value: float
+    kind: FaultKind  #: how it breaks
+    part: str  #: what breaks
+    at: float  #: when [s]
+    value: float  #: see ``FaultKind``
 
     @property
     def index(self) -> int:

@@ -59,17 +59,12 @@ which the line says nothing."""
 
 @dataclass(frozen=True, slots=True)
 class FrictionEstimate:
-    """What was identified: FL hip, thigh, calf, then FR, RL, RR.
+    """What was identified: FL hip, thigh, calf, then FR, RL, RR."""
 
-    Attributes:
-        dry, viscous: friction [N m], [N m s/rad].
-        dry_error, viscous_error: their standard errors.
-    """
-
-    dry: Float[np.ndarray, "12"]
-    viscous: Float[np.ndarray, "12"]
-    dry_error: Float[np.ndarray, "12"]
-    viscous_error: Float[np.ndarray, "12"]
+    dry: Float[np.ndarray, "12"]  #: friction [N m]
+    viscous: Float[np.ndarray, "12"]  #: friction [N m s/rad]
+    dry_error: Float[np.ndarray, "12"]  #: standard error of the dry one
+    viscous_error: Float[np.ndarray, "12"]  #: standard error of the viscous one
 
     @property
     def feed_forward(self) -> JointFriction:

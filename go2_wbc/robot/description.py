@@ -145,28 +145,21 @@ _UNPAINTED = (171, 177, 197, 255)  # a part without a material gets the trunk's 
 
 @dataclass(frozen=True, slots=True)
 class RobotDescription:
-    """Where the robot's files are, and the few facts that every model of it needs.
+    """Where the robot's files are, and the few facts that every model of it needs."""
 
-    Attributes:
-        profile: what the URDF does not say of the robot.
-        urdf_path, srdf_path: the URDF, and the SRDF or ``None`` if there is none.
-        package_dirs: folders against which ``package://`` mesh names resolve, first match wins.
-        disabled_pairs: pairs of links that the SRDF excludes from collision.
-        efforts, speeds: limits of each joint [N m], [rad/s], in the order of ``JOINT_NAMES``.
-        mass: of all links [kg].
-        origins: of each joint in the frame of the one above it [m], in the order of
-            ``JOINT_NAMES``; those of hips in the frame of the base.
-    """
-
-    profile: RobotProfile
-    urdf_path: Path
-    srdf_path: Path | None
+    profile: RobotProfile  #: what the URDF does not say of the robot
+    urdf_path: Path  #: of the URDF
+    srdf_path: Path | None  #: of the SRDF, or None if there is none
     package_dirs: tuple[Path, ...]
+    """Folders against which ``package://`` mesh names resolve, first match wins."""
     disabled_pairs: tuple[tuple[str, str], ...]
-    efforts: tuple[float, ...]
-    speeds: tuple[float, ...]
-    mass: float
+    """Pairs of links that the SRDF excludes from collision."""
+    efforts: tuple[float, ...]  #: limit of each joint [N m], in the order of ``JOINT_NAMES``
+    speeds: tuple[float, ...]  #: limit of each joint [rad/s], in the same order
+    mass: float  #: of all links [kg]
     origins: tuple[tuple[float, ...], ...]
+    """Of each joint in the frame of the one above it [m], in the order of ``JOINT_NAMES``; those of
+    hips in the frame of the base."""
 
     __repr__ = brief
 
@@ -334,16 +327,11 @@ def _number(text: str | None) -> float:
 
 @dataclass(frozen=True, slots=True)
 class MeshPart:
-    """All faces of a mesh file that have one colour.
+    """All faces of a mesh file that have one colour."""
 
-    Attributes:
-        points, triangles: (n, 3) vertices [m] in the frame of the file, and (m, 3) rows of them.
-        rgba: red, green, blue, opacity in 0..1.
-    """
-
-    points: ArrayNx3
-    triangles: Int[np.ndarray, "m 3"]
-    rgba: tuple[float, ...]
+    points: ArrayNx3  #: (n, 3) vertices [m] in the frame of the file
+    triangles: Int[np.ndarray, "m 3"]  #: (m, 3) rows of them
+    rgba: tuple[float, ...]  #: red, green, blue, opacity in 0..1
 
 
 def solid(kind: str, size: Array3, rgba: tuple[float, ...]) -> MeshPart | None:

@@ -111,41 +111,24 @@ _STEADY_HEADING = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class EstimatorNumbers:
-    """What a step of the filter is computed with.
+    """What a step of the filter is computed with."""
 
-    Attributes:
-        config: of the estimator.
-        legs: their lengths.
-        p_base_imu: place of the IMU in the base frame [m].
-        foot_radius: [m].
-        gravity: [m/s^2].
-    """
-
-    config: EstimatorConfig
-    legs: Legs
-    p_base_imu: Array3
-    foot_radius: float
-    gravity: float
+    config: EstimatorConfig  #: of the estimator
+    legs: Legs  #: their lengths
+    p_base_imu: Array3  #: place of the IMU in the base frame [m]
+    foot_radius: float  #: [m]
+    gravity: float  #: [m/s^2]
 
 
 class EstimatorState(Record):
-    """What is kept from tick to tick.
+    """What is kept from tick to tick."""
 
-    Attributes:
-        filter: the estimate, and how sure it is.
-        gyro: the last reading [rad/s].
-        gyro_noise: its noise, if that is more than usual [rad/s].
-        rest: whether the robot rests, lies or has tumbled.
-        level: the ground.
-        feet: what the legs measure.
-    """
-
-    filter: Filter
-    gyro: Array3
-    gyro_noise: float
-    rest: Rest
-    level: Level
-    feet: tuple[Foot, Foot, Foot, Foot]
+    filter: Filter  #: the estimate, and how sure it is
+    gyro: Array3  #: the last reading [rad/s]
+    gyro_noise: float  #: its noise, if that is more than usual [rad/s]
+    rest: Rest  #: whether the robot rests, lies or has tumbled
+    level: Level  #: the ground
+    feet: tuple[Foot, Foot, Foot, Foot]  #: what the legs measure
 
 
 @subroutine

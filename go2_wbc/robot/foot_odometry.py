@@ -42,39 +42,23 @@ _LEVEL_SHARE = 0.2
 
 
 class Foot(Record):
-    """A foot, as its leg measures it, along the world's axes.
+    """A foot, as its leg measures it, along the world's axes."""
 
-    Attributes:
-        age: time [s] for which it has touched the ground; the rest is of this tick alone.
-        place: of its centre from the IMU [m].
-        velocity: of the IMU if it rolls on the ground [m/s].
-        rolling: velocity of its centre then [m/s].
-        speed: of it along the trunk [m/s].
-        carries: whether it counts as standing.
-        variance: of the velocity; 0 if it is not to be taken in.
-        height_off: of the ground above it [m], where that is known to be level; else inf.
-    """
-
-    age: float
-    place: Array3
-    velocity: Array3
-    rolling: Array3
-    speed: float
-    carries: bool
-    variance: Array3
-    height_off: float
+    age: float  #: time [s] for which it has touched the ground; the rest is of this tick alone
+    place: Array3  #: of its centre from the IMU [m]
+    velocity: Array3  #: of the IMU if it rolls on the ground [m/s]
+    rolling: Array3  #: velocity of its centre then [m/s]
+    speed: float  #: of it along the trunk [m/s]
+    carries: bool  #: whether it counts as standing
+    variance: Array3  #: of the velocity; 0 if it is not to be taken in
+    height_off: float  #: of the ground above it [m], where that is known to be level; else inf
 
 
 class Level(Record):
-    """The ground, as far as it is level.
+    """The ground, as far as it is level."""
 
-    Attributes:
-        height: [m].
-        doubt_time: for which it is not believed [s].
-    """
-
-    height: float
-    doubt_time: float
+    height: float  #: [m]
+    doubt_time: float  #: for which it is not believed [s]
 
 
 @subroutine

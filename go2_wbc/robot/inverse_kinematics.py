@@ -48,22 +48,14 @@ _ROBOTS: WeakKeyDictionary[RobotModel, placo.RobotWrapper] = WeakKeyDictionary()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoseTargets:
-    """What a pose must be, in the world frame.
+    """What a pose must be, in the world frame."""
 
-    Attributes:
-        p_world_feet: foot centres [m]; the row of a raised leg is not used.
-        rpy, height: roll, pitch, yaw [rad] of the trunk, and height [m] of the base's origin.
-        raised: leg in the air, if any; its joints stay as they are at the start.
-        com_margin: least distance [m] of the CoM to the edges of the support polygon.
-        joint_margin: least distance [rad] of every joint to its limits.
-    """
-
-    p_world_feet: Array4x3
-    rpy: tuple[float, float, float]
-    height: float
-    raised: Leg | None = None
-    com_margin: float = 0.0
-    joint_margin: float = 0.05
+    p_world_feet: Array4x3  #: foot centres [m]; the row of a raised leg is not used
+    rpy: tuple[float, float, float]  #: roll, pitch, yaw [rad] of the trunk
+    height: float  #: height [m] of the base's origin
+    raised: Leg | None = None  #: leg in the air, if any; its joints stay as they are at the start
+    com_margin: float = 0.0  #: least distance [m] of the CoM to the edges of the support polygon
+    joint_margin: float = 0.05  #: least distance [rad] of every joint to its limits
 
     @property
     def stance(self) -> tuple[Leg, ...]:

@@ -31,42 +31,29 @@ from go2_wbc.records import Record
 from go2_wbc.robot.state import RobotState
 from go2_wbc.robot.state_filter import turn
 
-LAGS = 11
-"""Control periods by which a command may be late, none included: up to 20 ms at 500 Hz."""
+LAGS = 11  #: Control periods by which a command may be late, none included: up to 20 ms at 500 Hz
 MEMORY = 0.8
 """Time [s] over which misfits are averaged. Where commands act 0 to 18 ms late, drawn anew every 20
 ms, the lag found with 0.2 s went from 4 to 14 ms and back, and 3 of 5 robots fell in reversals of 2
 m/s; with this it stays in the middle, and none did."""
-BETTER = 0.01
-"""Share of the torques' own change by which another lag must fit better."""
-READ = 1.0
-"""Lag that is none of the commands: by so much readings may be old."""
+BETTER = 0.01  #: Share of the torques' own change by which another lag must fit better
+READ = 1.0  #: Lag that is none of the commands: by so much readings may be old
 WORST_FIT = 0.5
 """Share of that change up to which a lag may be off: motors that do not obey tell of none."""
-LEAST_CHANGE = 1e-3
-"""Mean square [N^2 m^2] of that change below which it says nothing."""
+LEAST_CHANGE = 1e-3  #: Mean square [N^2 m^2] of that change below which it says nothing
 
 
 class Lag(Record):
-    """What is known of how late commands act.
+    """What is known of how late commands act."""
 
-    Attributes:
-        tau_asked: torques of the last commands [N m], the newest first.
-        qdd: accelerations that they were to make [m/s^2, rad/s^2].
-        known: how many of them there are without a break.
-        misfit: mean square [N^2 m^2] of what was measured less what was asked, of each lag.
-        change: the same of the torques asked for, from the first lag to the last.
-        ticks: the lag that fits, in control periods.
-        acted: the one that fits this tick alone, if commands are late.
-    """
-
-    tau_asked: Float[np.ndarray, "11 12"]
-    qdd: Float[np.ndarray, "11 18"]
-    known: float
+    tau_asked: Float[np.ndarray, "11 12"]  #: torques of the last commands [N m], the newest first
+    qdd: Float[np.ndarray, "11 18"]  #: accelerations that they were to make [m/s^2, rad/s^2]
+    known: float  #: how many of them there are without a break
     misfit: Float[np.ndarray, "11"]
-    change: float
-    ticks: float
-    acted: float
+    """Mean square [N^2 m^2] of what was measured less what was asked, of each lag."""
+    change: float  #: the same of the torques asked for, from the first lag to the last
+    ticks: float  #: the lag that fits, in control periods
+    acted: float  #: the one that fits this tick alone, if commands are late
 
 
 @kernel

@@ -18,34 +18,24 @@ from go2_wbc.records import Array12, Array18, Array19, Record, packed
 from go2_wbc.robot.motor import MotorModel, torque_range
 from go2_wbc.robot.state import JointCommand, PartFault, RobotState
 
-SETTLING = 0.1
-"""Time constant [s] of the sums."""
-ASKED = 0.06
-"""Root mean square [N m] of what is asked, from which on a motor is judged."""
+SETTLING = 0.1  #: Time constant [s] of the sums
+ASKED = 0.06  #: Root mean square [N m] of what is asked, from which on a motor is judged
 NOISY_SPEED, SPEED_SHARE = 1.0, 0.1
 """Error of a joint's speed [rad/s], and share of it by which it errs besides: it is read with
 noise, and changes within a tick if the robot is flung. Times the damping gain it is torque that
 seems to be asked for: of half of it sound motors were named in `recover`."""
-WEAK, DEAD = 0.65, 0.25
-"""Share below which it is broken, and below which, since then, it is dead."""
-LASTS = 0.12
-"""For how long [s]: of sound motors, in the worlds of the tables, 0.02 at most."""
+WEAK, DEAD = 0.65, 0.25  #: Share below which it is broken, and below which, since then, it is dead
+LASTS = 0.12  #: For how long [s]: of sound motors, in the worlds of the tables, 0.02 at most
 
 
 class WatchedMotors(Record):
-    """What is remembered from tick to tick.
+    """What is remembered from tick to tick."""
 
-    Attributes:
-        given, asked: the sums [N^2 m^2].
-        weak_time: for how long the share has been too low [s].
-        weak_given, weak_asked: sums over that time [N^2 m^2].
-    """
-
-    given: Array12
-    asked: Array12
-    weak_time: Array12
-    weak_given: Array12
-    weak_asked: Array12
+    given: Array12  #: the sum of what was given [N^2 m^2]
+    asked: Array12  #: the sum of what was asked [N^2 m^2]
+    weak_time: Array12  #: for how long the share has been too low [s]
+    weak_given: Array12  #: ``given`` over that time [N^2 m^2]
+    weak_asked: Array12  #: ``asked`` over that time [N^2 m^2]
 
 
 @kernel

@@ -22,8 +22,7 @@ _SMOOTHING = 0.05
 _FLIGHT, _ARM = 0.5, 0.1
 """Share of gravity that a trunk feels at least if something carries it, while in flight it feels
 none; and the greatest distance [m] of the CoM from the IMU, by which one that turns feels w^2 r."""
-KNOWN, TUMBLED, LOST = range(3)
-"""Whether an estimate holds, or has to begin anew."""
+KNOWN, TUMBLED, LOST = range(3)  #: Whether an estimate holds, or has to begin anew
 _UPRIGHT = np.cos(np.radians(15.0))
 """Cosine of the angle between the accelerometer's up and the estimate's, at rest, if it is lost."""
 _OVER, _CALM = np.cos(np.radians(50.0)), 1.0
@@ -35,23 +34,14 @@ bias is then off 0."""
 
 
 class Rest(Record):
-    """What is remembered of it.
+    """What is remembered of it."""
 
-    Attributes:
-        joint_speeds: smoothed [rad/s].
-        still_time: for which all has been at rest [s].
-        lying_time: for which something else than the feet has carried the robot [s].
-        lost_time: for which the estimate has been lost [s].
-        upset_time: for which no biases are learnt [s].
-        tumbled: whether the robot has.
-    """
-
-    joint_speeds: Array12
-    still_time: float
-    lying_time: float
-    lost_time: float
-    upset_time: float
-    tumbled: bool
+    joint_speeds: Array12  #: smoothed [rad/s]
+    still_time: float  #: for which all has been at rest [s]
+    lying_time: float  #: for which something else than the feet has carried the robot [s]
+    lost_time: float  #: for which the estimate has been lost [s]
+    upset_time: float  #: for which no biases are learnt [s]
+    tumbled: bool  #: whether the robot has
 
 
 @subroutine

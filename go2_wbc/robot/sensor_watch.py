@@ -49,13 +49,11 @@ JUMP = 0.05
 """rad; a joint's angle differs by less from what its speed says, however hard the foot lands."""
 LONGEST_STEP, USUAL_STEP = 0.05, 0.002
 """Time [s] between two readings of one stretch, and that taken for the first one's."""
-DOUBT = 0.01
-"""Time [s] after which a joint that reads the very same says nothing of the IMU."""
+DOUBT = 0.01  #: Time [s] after which a joint that reads the very same says nothing of the IMU
 STUCK_TIME = 0.1
 """An encoder is stuck if it has read the very same for so long [s], while its leg's others have
 changed: noise alone lets none stay for more than 8 ms, not even at rest."""
-SMOOTHING = 0.008
-"""Time constant [s] of the joints' accelerations."""
+SMOOTHING = 0.008  #: Time constant [s] of the joints' accelerations
 LOADED, FREE = 20.0, 10.0
 """Force [N] by a leg's torques above which its foot stands; 99 % that swing bear less than 7."""
 LANDED = 0.03
@@ -71,86 +69,55 @@ NOISY, MOST_NOISE, NOISE_TIME = 1.5, 4.0, 0.2
 """Mean of |f - 2 f_1 + f_2|, up to so much [N], over this time [s], above which a sensor has noise:
 its own is 2.6. While such a one changes it lives, whatever its leg bears: a calf may lie on a box.
 Others say the same while the load stays: they are judged once that changes."""
-CHANGED = 15.0
-"""By so much [N]."""
+CHANGED = 15.0  #: By so much [N]
 RUBBING = 2.0
 """N m s/rad; joints damped so, as in MuJoCo Menagerie's Go2, may not be taken for loads."""
 CARRIED, UPRIGHT = 0.7, 0.9
 """Share of the robot's weight that its legs bear while it stands or walks, and the cosine of its
 greatest tilt then: legs of one that lies or tumbles strike what they do not stand on."""
-STANDING = np.tile([0.0, 0.8, -1.6], 4)
-"""Joint angles [rad] of a robot that stands, roughly."""
+STANDING = np.tile([0.0, 0.8, -1.6], 4)  #: Joint angles [rad] of a robot that stands, roughly
 
 
 class WatchedSensors(Record):
-    """What is remembered from reading to reading.
+    """What is remembered from reading to reading."""
 
-    Attributes:
-        has_begun: 1 once there has been one.
-        step: the last time between two [s].
-        whole: how many came since one was lost: what turned meanwhile is not judged.
-        q, v: the last angles [rad] and speeds [rad/s], as they were read.
-        shift: what is taken off the angles [rad].
-        dv: smoothed accelerations of the joints [rad/s^2].
-        same: for how long a joint has read the very same [s].
-        force, rise: the last of each foot [N], as it was read, and its last change.
-        noise: of it, while it is free and while it stands; see ``NOISY`` [N].
-        force_same: for how long it has been the very same [s].
-        load: of the leg, when that began [N].
-        stood: for how long a foot has borne its leg's load [s].
-        against: for how long a foot's force has contradicted the leg's torques [s].
-        gyro, accelerometer: the last, as they were read.
-        speed_noise: of the joints' speeds and the gyro.
-        imu: the IMU against feet that stand.
-        stuck, force_is_wrong, gyro_is_off, accelerometer_is_off: 1 for what is broken.
-        jumped: 1 for an encoder whose shift is not 0.
-    """
-
-    has_begun: float
-    step: float
-    whole: float
-    q: Array12
-    v: Array12
-    shift: Array12
-    dv: Array12
-    same: Array12
-    force: Array4
-    rise: Array4
+    has_begun: float  #: 1 once there has been one
+    step: float  #: the last time between two [s]
+    whole: float  #: how many came since one was lost: what turned meanwhile is not judged
+    q: Array12  #: the last angles [rad], as they were read
+    v: Array12  #: the last speeds [rad/s], as they were read
+    shift: Array12  #: what is taken off the angles [rad]
+    dv: Array12  #: smoothed accelerations of the joints [rad/s^2]
+    same: Array12  #: for how long a joint has read the very same [s]
+    force: Array4  #: the last of each foot [N], as it was read
+    rise: Array4  #: its last change [N]
     noise: Float[np.ndarray, "2 4"]
-    force_same: Array4
-    load: Array4
-    stood: Array4
-    against: Array4
-    gyro: Array3
-    accelerometer: Array3
-    speed_noise: SpeedNoise
-    imu: WatchedImu
-    stuck: Array12
-    jumped: Array12
-    force_is_wrong: Array4
-    gyro_is_off: float
-    accelerometer_is_off: float
+    """Of the force, while a foot is free and while it stands; see ``NOISY`` [N]."""
+    force_same: Array4  #: for how long it has been the very same [s]
+    load: Array4  #: of the leg, when that began [N]
+    stood: Array4  #: for how long a foot has borne its leg's load [s]
+    against: Array4  #: for how long a foot's force has contradicted the leg's torques [s]
+    gyro: Array3  #: the last, as it was read
+    accelerometer: Array3  #: the last, as it was read
+    speed_noise: SpeedNoise  #: of the joints' speeds and the gyro
+    imu: WatchedImu  #: the IMU against feet that stand
+    stuck: Array12  #: 1 for an encoder that is
+    jumped: Array12  #: 1 for an encoder whose shift is not 0
+    force_is_wrong: Array4  #: 1 for a foot's force that is
+    gyro_is_off: float  #: 1 if it is
+    accelerometer_is_off: float  #: 1 if it is
 
 
 @dataclass(frozen=True, slots=True)
 class WatchNumbers:
-    """What the robot is, to those who watch it.
+    """What the robot is, to those who watch it."""
 
-    Attributes:
-        legs: their lengths.
-        foot_radius: [m].
-        inertia: of each leg about its joints, standing [kg m^2].
-        weight: of the robot [N].
-        gravity: [m/s^2].
-        p_base_imu: place of the IMU in the base frame [m].
-    """
-
-    legs: Legs
-    foot_radius: float
-    inertia: Float[np.ndarray, "4 3 3"]
-    weight: float
-    gravity: float
-    p_base_imu: Array3
+    legs: Legs  #: their lengths
+    foot_radius: float  #: [m]
+    inertia: Float[np.ndarray, "4 3 3"]  #: of each leg about its joints, standing [kg m^2]
+    weight: float  #: of the robot [N]
+    gravity: float  #: [m/s^2]
+    p_base_imu: Array3  #: place of the IMU in the base frame [m]
 
     @classmethod
     def of(cls, model: RobotModel) -> WatchNumbers:

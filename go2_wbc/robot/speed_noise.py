@@ -15,8 +15,7 @@ from go2_wbc.compilation import subroutine
 from go2_wbc.records import Array3, Array12, Record
 from go2_wbc.robot.state import SensorReading
 
-MEASURING = 0.2
-"""Time [s] over which the squares of e are averaged."""
+MEASURING = 0.2  #: Time [s] over which the squares of e are averaged
 NOISY_JOINTS, NOISY_GYRO = 0.8, 0.2
 """Root of that mean [rad/s] from which on they are noisy: of sound sensors, while late commands let
 the robot land hard, it was 0.24 and 0.04 at most."""
@@ -27,23 +26,15 @@ SMOOTHING = 0.008
 
 
 class SpeedNoise(Record):
-    """What is remembered from reading to reading.
+    """What is remembered from reading to reading."""
 
-    Attributes:
-        count: of readings.
-        joints, gyro: mean squares of e [rad^2/s^2].
-        v: the joints' last speeds, as they were passed on [rad/s].
-        w, change: the gyro's last reading, and its last change [rad/s].
-        smooth: smoothed readings of the gyro [rad/s].
-    """
-
-    count: float
-    joints: float
-    gyro: float
-    v: Array12
-    w: Array3
-    change: Array3
-    smooth: Array3
+    count: float  #: of readings
+    joints: float  #: mean square of e [rad^2/s^2], of the joints
+    gyro: float  #: the same, of the gyro
+    v: Array12  #: the joints' last speeds, as they were passed on [rad/s]
+    w: Array3  #: the gyro's last reading [rad/s]
+    change: Array3  #: its last change [rad/s]
+    smooth: Array3  #: smoothed readings of the gyro [rad/s]
 
 
 @subroutine

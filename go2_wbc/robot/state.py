@@ -108,40 +108,25 @@ class RobotState:
 
 @dataclass(frozen=True, slots=True)
 class SensorReading:
-    """What the robot measures at one instant.
+    """What the robot measures at one instant."""
 
-    Attributes:
-        time: robot time [s].
-        gyro: angular velocity [rad/s] in the base frame.
-        accelerometer: specific force [m/s^2] in the base frame; +9.81 upwards at rest.
-        q_joints, v_joints, tau: joint angles [rad], velocities [rad/s] and torques [N m].
-        foot_forces: normal force at each foot [N].
-    """
-
-    time: float
-    gyro: Array3
-    accelerometer: Array3
-    q_joints: Array12
-    v_joints: Array12
-    tau: Array12
-    foot_forces: Array4
+    time: float  #: robot time [s]
+    gyro: Array3  #: angular velocity [rad/s] in the base frame
+    accelerometer: Array3  #: specific force [m/s^2] in the base frame; +9.81 upwards at rest
+    q_joints: Array12  #: joint angles [rad]
+    v_joints: Array12  #: joint velocities [rad/s]
+    tau: Array12  #: joint torques [N m]
+    foot_forces: Array4  #: normal force at each foot [N]
 
 
 @dataclass(frozen=True, slots=True)
 class PartFault:
-    """A part of the robot that is broken.
+    """A part of the robot that is broken."""
 
-    Attributes:
-        part: its name, as ``FL_calf_joint``, ``FL_foot``, ``gyro``.
-        what: is the matter with it, in plain words.
-        is_survived: whether the robot can go on.
-        since: robot time [s] at which it was noticed.
-    """
-
-    part: str
-    what: str
-    is_survived: bool
-    since: float
+    part: str  #: its name, as ``FL_calf_joint``, ``FL_foot``, ``gyro``
+    what: str  #: is the matter with it, in plain words
+    is_survived: bool  #: whether the robot can go on
+    since: float  #: robot time [s] at which it was noticed
 
     def __str__(self) -> str:
         return f"{self.part} {self.what} (since {self.since:.2f} s)"
@@ -168,15 +153,11 @@ class Health:
 
 @dataclass(frozen=True, slots=True)
 class OdometryCovariance:
-    """How sure a state is of the base: of its errors, as ``nav_msgs/Odometry`` has them.
+    """How sure a state is of the base: of its errors, as ``nav_msgs/Odometry`` has them."""
 
-    Attributes:
-        pose: of position [m] and turn about fixed axes [rad], in the world.
-        twist: of linear [m/s] and angular [rad/s] velocity, in the base frame.
-    """
-
-    pose: Float[np.ndarray, "6 6"]
+    pose: Float[np.ndarray, "6 6"]  #: of position [m] and turn about fixed axes [rad], in the world
     twist: Float[np.ndarray, "6 6"]
+    """Of linear [m/s] and angular [rad/s] velocity, in the base frame."""
 
     __repr__ = brief
 

@@ -34,22 +34,14 @@ from go2_wbc.robot.estimator_config import EstimatorConfig
 
 
 class Estimate(Record):
-    """The state.
+    """The state."""
 
-    Attributes:
-        p, v: position [m] and velocity [m/s] of the IMU in the world.
-        quaternion: x y z w, of the trunk.
-        gyro_bias: [rad/s] in the base frame.
-        force_bias: of the accelerometer [m/s^2].
-        p_feet: centres of the feet in the world [m].
-    """
-
-    p: Array3
-    v: Array3
-    quaternion: Array4
-    gyro_bias: Array3
-    force_bias: Array3
-    p_feet: Array4x3
+    p: Array3  #: position [m] of the IMU in the world
+    v: Array3  #: velocity [m/s] of the IMU in the world
+    quaternion: Array4  #: x y z w, of the trunk
+    gyro_bias: Array3  #: [rad/s] in the base frame
+    force_bias: Array3  #: of the accelerometer [m/s^2]
+    p_feet: Array4x3  #: centres of the feet in the world [m]
 
 
 class EstimateError(Record):

@@ -118,12 +118,9 @@ class StanceFeetStill(Equality):
     J a + dJ/dt v = -damping J v in the world frame. With 0 on the right, what integration leaves of
     a velocity would stay for ever; so it decays as exp(-damping t) (Baumgarte, Comp. Meth. Appl.
     Mech. Eng. 1, 1972). There is no term of position: a foot may stand anywhere.
-
-    Attributes:
-        damping: rate [1/s] at which a remaining velocity of the contact point is taken out.
     """
 
-    damping: float
+    damping: float  #: rate [1/s] at which a remaining velocity of the contact point is taken out
     name = "stance feet"
     unit = "m/s^2"
 
@@ -216,12 +213,9 @@ class TorqueLimits(Inequality):
     """tau within what the motors give, tau being the joint rows of M a + h - J' f.
 
     The limits are those at the measured joint speeds. Without torque they are always met.
-
-    Attributes:
-        motor: the motors, at the share of their torque that may be used.
     """
 
-    motor: MotorModel
+    motor: MotorModel  #: the motors, at the share of their torque that may be used
     name = "torque limits"
     unit = "N m"
 
@@ -292,18 +286,13 @@ class JointLimits(Inequality):
     no solution, the root counts as 0: the joint has to come back. No bound asks for more than
     ``braking``; whether the legs can brake that hard, at the torque limits and with their feet on
     the ground, is for the QP to tell.
-
-    Attributes:
-        q_lower, q_upper, speed: limits of position [rad] and speed [rad/s].
-        braking: deceleration [rad/s^2] that is always available.
-        horizon: time [s] in which a bound on the velocity must be met.
     """
 
-    q_lower: Array12
-    q_upper: Array12
-    speed: Array12
-    braking: float
-    horizon: float
+    q_lower: Array12  #: limit of position [rad]
+    q_upper: Array12  #: limit of position [rad]
+    speed: Array12  #: limit of speed [rad/s]
+    braking: float  #: deceleration [rad/s^2] that is always available
+    horizon: float  #: time [s] in which a bound on the velocity must be met
     name = "joint limits"
     unit = "rad/s^2"
 

@@ -55,18 +55,12 @@ _TRIFLES = {"m/s^2": 0.01, "N": 0.1, "N m": 0.01, "rad/s^2": 0.1}  # of what gav
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """A limit that alone would have to give way.
+    """A limit that alone would have to give way."""
 
-    Attributes:
-        name: what it is, of which foot or joint.
-        needs, has: what would do, and what there is [unit].
-        unit: of both.
-    """
-
-    name: str
-    needs: float
-    has: float
-    unit: str
+    name: str  #: what it is, of which foot or joint
+    needs: float  #: what would do [unit]
+    has: float  #: what there is [unit]
+    unit: str  #: of both
 
     def __str__(self) -> str:
         return f"{self.name}: needs {self.needs:.3g} {self.unit}, has {self.has:.3g}"
@@ -74,21 +68,14 @@ class Demand:
 
 @dataclass(frozen=True, slots=True)
 class Contradiction:
-    """Why no decision keeps all limits.
+    """Why no decision keeps all limits."""
 
-    Attributes:
-        name: the limit that is to blame.
-        against: the limit that it contradicts most; "" if it leaves nothing by itself.
-        demand: what of it would do; None if no limit alone could give way.
-        others: what else could give way alone.
-        gave_way: what gave way in the nearest answer, which is followed; nothing if there is none.
-    """
-
-    name: str
-    against: str
-    demand: Demand | None
-    others: tuple[Demand, ...]
+    name: str  #: the limit that is to blame
+    against: str  #: the limit that it contradicts most; "" if it leaves nothing by itself
+    demand: Demand | None  #: what of it would do; None if no limit alone could give way
+    others: tuple[Demand, ...]  #: what else could give way alone
     gave_way: tuple[str, ...]
+    """What gave way in the nearest answer, which is followed; nothing if there is none."""
 
     @staticmethod
     def of(problem: Problem) -> Contradiction:

@@ -70,46 +70,29 @@ _TINY = 1e-9  # a multiplier below this share of the greatest is rounding
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """What one unit more of a limit gives.
+    """What one unit more of a limit gives."""
 
-    Attributes:
-        what: the row of a task that gains most of the cost.
-        amount: by how much its error falls for each unit of the limit.
-        error: of the row now.
-        unit: of amount and error.
-    """
-
-    what: str
-    amount: float
-    error: float
-    unit: str
+    what: str  #: the row of a task that gains most of the cost
+    amount: float  #: by how much its error falls for each unit of the limit
+    error: float  #: of the row now
+    unit: str  #: of amount and error
 
 
 @dataclass(frozen=True, slots=True)
 class BindingLimit:
-    """A limit that the decision is at.
+    """A limit that the decision is at."""
 
-    Attributes:
-        name: what it is, of which foot or joint.
-        side: "upper" or "lower".
-        value, limit: where the decision is, and may be [unit].
-        unit: of limit, multiplier and reach.
-        multiplier: by how much the cost falls for one unit more.
-        gives: what it falls by, in the unit of a task.
-        reach: for how much more of the limit that holds, before another one binds or this one does
-            no longer.
-        cost: by how much the cost would fall without it.
-    """
-
-    name: str
-    side: str
-    value: float
-    limit: float
-    unit: str
-    multiplier: float
-    gives: Gain
+    name: str  #: what it is, of which foot or joint
+    side: str  #: "upper" or "lower"
+    value: float  #: where the decision is [unit]
+    limit: float  #: where it may be [unit]
+    unit: str  #: of limit, multiplier and reach
+    multiplier: float  #: by how much the cost falls for one unit more
+    gives: Gain  #: what it falls by, in the unit of a task
     reach: float
-    cost: float
+    """For how much more of the limit that holds, before another one binds or this one does no
+    longer."""
+    cost: float  #: by how much the cost would fall without it
 
     @property
     def slack(self) -> float:

@@ -25,24 +25,16 @@ _LEAST = 1e-3  # [N, N m] what counts as nothing
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """One side of a row, or what a foot's contact asks for.
+    """One side of a row, or what a foot's contact asks for."""
 
-    Attributes:
-        name: in plain words.
-        value: what the decision makes of it.
-        limit: what it may be at most, or at least.
-        unit: of both.
-        unusual: how much tighter it is than that of a sound robot on its feet: the logarithm of how
-            many times, and what a contact or a joint's end asks for by ``LIMITS``.
-        per_row: by how much the row's bound moves for one unit of this limit.
-    """
-
-    name: str
-    value: float
-    limit: float
-    unit: str
+    name: str  #: in plain words
+    value: float  #: what the decision makes of it
+    limit: float  #: what it may be at most, or at least
+    unit: str  #: of both
     unusual: float
-    per_row: float = 1.0
+    """How much tighter it is than that of a sound robot on its feet: the logarithm of how many
+    times, and what a contact or a joint's end asks for by ``LIMITS``."""
+    per_row: float = 1.0  #: by how much the row's bound moves for one unit of this limit
 
 
 def places_of(problem: Problem) -> Int[np.ndarray, " rows"]:

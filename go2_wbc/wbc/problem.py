@@ -57,24 +57,16 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One assembled QP.
+    """One assembled QP."""
 
-    Attributes:
-        snapshot, reference: what the rows were made from.
-        tasks, weights: stacked task rows, not weighted, and (rows,) the weight of each.
-        equalities, bounds: stacked rows of equalities and inequalities.
-        sources: who contributed rows, tasks first, then equalities, then bounds.
-        counts: how many rows each of them contributed.
-    """
-
-    snapshot: Snapshot
-    reference: Reference
-    tasks: Rows
-    weights: Float[np.ndarray, " rows"]
-    equalities: Rows
-    bounds: Bounds
-    sources: tuple[Source, ...]
-    counts: tuple[int, ...]
+    snapshot: Snapshot  #: what the rows were made from
+    reference: Reference  #: what the rows were made from
+    tasks: Rows  #: stacked task rows, not weighted
+    weights: Float[np.ndarray, " rows"]  #: (rows,) the weight of each
+    equalities: Rows  #: stacked rows of equalities
+    bounds: Bounds  #: stacked rows of inequalities
+    sources: tuple[Source, ...]  #: who contributed rows, tasks first, then equalities, then bounds
+    counts: tuple[int, ...]  #: how many rows each of them contributed
 
     @property
     def stance(self) -> Bool[np.ndarray, "4"]:

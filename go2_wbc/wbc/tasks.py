@@ -130,17 +130,11 @@ def fill_body_position(now: Snapshot, target: Target, task: BodyPosition, rows: 
 
 @dataclass(frozen=True, slots=True)
 class BodyPosition(BuiltIn):
-    """Move the CoM or the base along the reference, in the world frame.
+    """Move the CoM or the base along the reference, in the world frame."""
 
-    Attributes:
-        gains: per axis of the world.
-        weight_of_robot: [N] without what it carries.
-        weight: of the task.
-    """
-
-    gains: Gains
-    weight_of_robot: float
-    weight: float = 1.0
+    gains: Gains  #: per axis of the world
+    weight_of_robot: float  #: [N] without what it carries
+    weight: float = 1.0  #: of the task
     name, unit = "body position", "m/s^2"
     fill, part = staticmethod(fill_body_position), range(3)
 

@@ -56,17 +56,11 @@ class Rise:
 
 @dataclass(frozen=True, slots=True)
 class ProbabilityModel:
-    """What turns margins into a chance.
+    """What turns margins into a chance."""
 
-    Attributes:
-        rises: by the names of the checks.
-        rest: ``b``, the log odds that all goes well that no margin tells of.
-        leak: ``e``, 0 to 1: how much of that is left where a margin says no.
-    """
-
-    rises: Mapping[str, Rise]
-    rest: float
-    leak: float = 0.0
+    rises: Mapping[str, Rise]  #: by the names of the checks
+    rest: float  #: ``b``, the log odds that all goes well that no margin tells of
+    leak: float = 0.0  #: ``e``, 0 to 1: how much of that is left where a margin says no
 
     @staticmethod
     def of(values: Mapping[str, Any]) -> ProbabilityModel:

@@ -91,13 +91,9 @@ class Encoder:
 @final
 @dataclass(frozen=True, slots=True)
 class Decoder:
-    """Turns JSON into values.
+    """Turns JSON into values."""
 
-    Attributes:
-        arrays: of the file.
-    """
-
-    arrays: Mapping[str, np.ndarray] = field(default_factory=dict)
+    arrays: Mapping[str, np.ndarray] = field(default_factory=dict)  #: of the file
 
     def decoded(self, value: Json, kind: Kind, where: str) -> Decoded:
         """The ``kind`` that ``value`` stands for.
@@ -266,19 +262,12 @@ LARGEST_FILE = 100_000_000
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """A kind of file.
+    """A kind of file."""
 
-    Attributes:
-        name: what such a file says of itself.
-        version: that is written; older ones are read, too.
-        what: for a person.
-        suffix: ending of its files.
-    """
-
-    name: str
-    version: int
-    what: str
-    suffix: str
+    name: str  #: what such a file says of itself
+    version: int  #: that is written; older ones are read, too
+    what: str  #: for a person
+    suffix: str  #: ending of its files
 
     def header(self) -> dict[str, Any]:
         """What a file of this kind begins with."""

@@ -1,7 +1,5 @@
 """The benchmark of the studio draws motions that can be made, and counts all processor time."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -26,8 +26,7 @@ from motions import CompiledPlan, FeasibilityChecker, Playable
 STAND_HEIGHT = find_profile().stand_height
 SIT_POSE = find_profile().sit_pose
 
-PERIOD = 0.01
-"""Time [s] between two samples."""
+PERIOD = 0.01  #: Time [s] between two samples
 SIT = {"base height [m]": float(SIT_POSE[2]), "pitch [deg]": math.degrees(SIT_POSE[4])}
 STAND = {"CoM height [m]": STAND_HEIGHT}
 RAISED = {"least paw height [m]": 0.6, "mean paw height [m]": 0.61}

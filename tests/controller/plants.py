@@ -24,8 +24,7 @@ TUCKED_JOINTS = find_profile().tucked_joints
 PERIOD = 0.004
 # s; only ends a test that hangs. No result depends on it.
 HANG_GUARD = 120.0
-# s of robot time: in the middle of rising, when the whole-body QP is at work.
-MID_RISE = 1.5
+MID_RISE = 1.5  # s of robot time: in the middle of rising, when the whole-body QP is at work
 
 # s; range of the time after which Ctrl-C comes, and after which it comes again: Python swallows one
 # that comes in a destructor.

@@ -16,12 +16,9 @@ ASKED = BodyPose(-0.05, math.radians(8), math.radians(8), math.radians(10))
 SPEED = 0.5
 OFF, LOW = math.radians(2), 0.010
 """Angle [rad] and height [m] by which the measured mean may be off."""
-SLOW = 0.02
-"""Share by which the mean speed may be off."""
-JUMP = 1.2
-"""Rate of the trunk's attitude [rad/s] that a jump of the reference would exceed."""
-WINDOW = 1.44
-"""Time [s] of whole strides."""
+SLOW = 0.02  #: Share by which the mean speed may be off
+JUMP = 1.2  #: Rate of the trunk's attitude [rad/s] that a jump of the reference would exceed
+WINDOW = 1.44  #: Time [s] of whole strides
 
 
 def watch(go2: GO2Controller, seconds: float) -> np.ndarray:

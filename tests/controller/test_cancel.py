@@ -17,8 +17,7 @@ from tests.controller.plants import WatchedPlant
 from tests.stepping_plans import LANDING, LIFT_OFF, TAKE_OFF, TOUCHDOWN, hop_plan, step_plan
 
 TICK = 0.002
-# s into the high five: lifting, tapping, lowering.
-MOMENTS = (2.0, 5.4, 7.0)
+MOMENTS = (2.0, 5.4, 7.0)  # s into the high five: lifting, tapping, lowering
 
 
 @pytest.fixture(scope="module")

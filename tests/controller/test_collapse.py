@@ -13,22 +13,14 @@ from go2_wbc.robot.safety import SafetyConfig
 from motions.postures import lean
 from tests.controller.plants import PERIOD, WatchedPlant
 
-# s; a push is as short as a kick.
-PUSH_TIME = 0.1
-# s of robot time that follow the push.
-AFTER = 2.0
-# N; the trunk weighs on the ground.
-TOUCH = 1.0
-# s; shorter touches are stumbles.
-STUMBLE = 0.05
-# s; in which a collapse must be noticed.
-NOTICED = 0.2
-# s; the plan lifts the trunk by 6 cm in 0.7 s, then a fall is noticed at once.
-HELD = 1.0
-# s; in which a robot that was tipped onto a limb must have noticed.
-TIPPED = 1.2
-# deg; more than that off its posture no robot was that withstood a push.
-MUCH = 30.0
+PUSH_TIME = 0.1  # s; a push is as short as a kick
+AFTER = 2.0  # s of robot time that follow the push
+TOUCH = 1.0  # N; the trunk weighs on the ground
+STUMBLE = 0.05  # s; shorter touches are stumbles
+NOTICED = 0.2  # s; in which a collapse must be noticed
+HELD = 1.0  # s; the plan lifts the trunk by 6 cm in 0.7 s, then a fall is noticed at once
+TIPPED = 1.2  # s; in which a robot that was tipped onto a limb must have noticed
+MUCH = 30.0  # deg; more than that off its posture no robot was that withstood a push
 # rad; roll and pitch of a robot that leans, as for a command from outside.
 LEANING = (0.1, 0.15, 0.0)
 

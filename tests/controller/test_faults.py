@@ -29,10 +29,8 @@ from tests.controller.plants import (
 )
 from tests.go2_wbc.plant.contract import PlantContract
 
-# A share of the motors' torque with which the legs cannot carry the trunk.
-FEEBLE = 0.05
-# kg; two and a half times the robot's own mass.
-HEAVY = 40.0
+FEEBLE = 0.05  # A share of the motors' torque with which the legs cannot carry the trunk
+HEAVY = 40.0  # kg; two and a half times the robot's own mass
 # N for 0.2 s at the trunk: 60 N s, three times what a standing robot withstands.
 SHOVE = np.array([0.0, 500.0, 0.0])
 

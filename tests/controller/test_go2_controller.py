@@ -22,8 +22,7 @@ from tests.motions.doctored import with_joint_beyond_its_limit
 # What the goals promise.
 DISTANCE_TOLERANCE = 0.02
 ANGLE_TOLERANCE = np.radians(1.5)
-# m; a walked way sags and sways by less than this.
-SIDE_TOLERANCE = 0.05
+SIDE_TOLERANCE = 0.05  # m; a walked way sags and sways by less than this
 
 
 @dataclass(frozen=True)

@@ -92,8 +92,7 @@ ARGUMENTS = {
     **dict.fromkeys(("wait", "move_forward", "turn_left", "turn_right"), (1.0,)),
     "play": ("high_five",),
 }
-ALLOWED = {"close", "destroy_node", "explain", "prepare", "recording"}
-"""What may still be called."""
+ALLOWED = {"close", "destroy_node", "explain", "prepare", "recording"}  #: What may still be called
 CALLS = [
     name
     for name, member in vars(GO2Controller).items()

@@ -16,8 +16,7 @@ from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline
 from tests.controller.plants import StillPlant
 from tests.solver import needs_solver
 
-AS_REPORTED = 0.010
-"""Difference [m] between what is reported of the trunk and what is measured."""
+AS_REPORTED = 0.010  #: Difference [m] between what is reported of the trunk and what is measured
 STILL = 0.008
 """Distance [m] that a foot which stands may slide: less than the 10 mm that count as a slip."""
 

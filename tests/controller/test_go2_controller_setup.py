@@ -47,24 +47,6 @@ def test_without_the_robots_files_the_error_says_what_to_install(
         GO2Controller()
 
 
-@pytest.mark.parametrize(
-    ("edit", "message"),
-    [
-        (lambda text: text[: len(text) // 2], "not a valid URDF"),
-        (lambda text: text.replace("FL_hip_joint", "front_left"), "lacks: joint FL_hip_joint"),
-        (lambda text: text.replace("<robot", "<cow").replace("</robot", "</cow"), "root is <cow>"),
-    ],
-)
-def test_a_broken_urdf_is_refused_with_the_reason(
-    tmp_path: Path, edit: Callable[[str], str], message: str
-) -> None:
-    path = tmp_path / "mine.urdf"
-    text = find_description().urdf_path.read_text(encoding="utf-8")
-    path.write_text(edit(text), encoding="utf-8")
-    with pytest.raises(DescriptionError, match=message):
-        GO2Controller(plant=MujocoPlant(urdf=path))
-
-
 def test_a_missing_urdf_or_mjcf_is_named(tmp_path: Path) -> None:
     with pytest.raises(DescriptionError, match=r"nowhere\.urdf: No such file"):
         GO2Controller(plant=MujocoPlant(urdf=tmp_path / "nowhere.urdf"))

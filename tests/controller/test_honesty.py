@@ -15,8 +15,7 @@ from go2_wbc.robot.state import JointCommand
 from motions import Timeline
 from tests.controller.plants import HANG_GUARD, PERIOD, WatchedPlant, in_thread
 
-# A share of the motors' torque with which a walking robot sinks to the ground.
-FEEBLE = 0.2
+FEEBLE = 0.2  # A share of the motors' torque with which a walking robot sinks to the ground
 
 
 class FadingPlant(WatchedPlant):

@@ -17,8 +17,7 @@ from go2_wbc.recording import Recording
 from motions import CheckedMotion, FeasibilityChecker, Timeline, load_motion
 from tests.viz.synthetic import step_ahead
 
-LARGEST = 1_200_000
-"""Of ten seconds of a motion [bytes]."""
+LARGEST = 1_200_000  #: Of ten seconds of a motion [bytes]
 
 
 @pytest.fixture(scope="module")

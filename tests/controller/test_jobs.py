@@ -15,10 +15,8 @@ from go2_wbc.robot.state import RobotState
 from tests.controller.plants import HANG_GUARD, in_thread, lying_state
 
 PATIENCE = 0.8
-LOOKS = 5000
-"""How often, a millisecond apart, a test looks whether a job is prepared."""
-A_WHILE = 0.2
-"""Time [s] in which a thread that spins is seen to."""
+LOOKS = 5000  #: How often, a millisecond apart, a test looks whether a job is prepared
+A_WHILE = 0.2  #: Time [s] in which a thread that spins is seen to
 
 
 class Robot:

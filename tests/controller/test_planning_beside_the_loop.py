@@ -16,8 +16,7 @@ from motions import FeasibilityChecker
 from motions.feasibility.report import FeasibilityReport
 from tests.controller.plants import StillPlant
 
-# s; between two ticks of a robot that keeps the processor busy.
-PERIOD = 2e-4
+PERIOD = 2e-4  # s; between two ticks of a robot that keeps the processor busy
 # s; the interpreter changes threads after nearly every instruction.
 SWITCH_INTERVAL = 1e-6
 MOTIONS = ("bow", "nod", "wave", "high_five")

@@ -19,8 +19,7 @@ from tests.engine_helpers import state_of
 
 TUCKED_JOINTS = find_profile().tucked_joints
 
-# rad; the rear thigh points ahead, beside the trunk, at its limit.
-WRAPPED = (0.0, 4.5, -2.0)
+WRAPPED = (0.0, 4.5, -2.0)  # rad; the rear thigh points ahead, beside the trunk, at its limit
 # rad/s; enough to drive it against the trunk, where it jams.
 KICK = 8.0
 SETTLE_TICKS = 150

@@ -32,8 +32,7 @@ from tests.controller.plants import (
 
 TUCKED_JOINTS = find_profile().tucked_joints
 
-# s of robot time; far more than any of these tests lets pass.
-FOREVER = 1e6
+FOREVER = 1e6  # s of robot time; far more than any of these tests lets pass
 
 MakeRunner = Callable[..., Runner]
 

@@ -16,10 +16,8 @@ from tests.controller.plants import WatchedPlant
 from tests.stepping_plans import LANDING, TAKE_OFF, hop_plan, step_plan
 
 MODEL = RobotModel()
-STEP_ERROR = 0.015
-"""What is asked of a step [m]."""
-FORWARD = 0.1
-"""Of the hop [m]."""
+STEP_ERROR = 0.015  #: What is asked of a step [m]
+FORWARD = 0.1  #: Of the hop [m]
 
 
 def standing() -> tuple[WatchedPlant, GO2Controller]:

@@ -14,10 +14,8 @@ from go2_wbc.robot.model import RobotModel
 from motions.postures import standing_feet, standing_on
 from tests.controller.plants import HANG_GUARD, in_thread
 
-SLIDES = 0.01
-"""m; a foot that stays moves by less: it rolls by a few mm as the trunk rises."""
-OFF = np.random.default_rng(9600).uniform(-0.05, 0.05, (4, 2))
-"""m; feet off square."""
+SLIDES = 0.01  #: m; a foot that stays moves by less: it rolls by a few mm as the trunk rises
+OFF = np.random.default_rng(9600).uniform(-0.05, 0.05, (4, 2))  #: m; feet off square
 
 
 def stance(

@@ -19,8 +19,7 @@ PERIOD = 0.002
 ALL = np.ones(4, dtype=bool)
 
 
-HUGE_PAGES = 4 << 20
-"""Memory [bytes] from which on numpy asks for huge pages."""
+HUGE_PAGES = 4 << 20  #: Memory [bytes] from which on numpy asks for huge pages
 
 
 @pytest.fixture(autouse=True, params=[BLOCK, 7])

@@ -30,10 +30,8 @@ from tests.controller.plants import (
     is_limp,
 )
 
-# s into a call, when it is well under way.
-UNDER_WAY = 0.1
-# m/s
-SLOW = 0.3
+UNDER_WAY = 0.1  # s into a call, when it is well under way
+SLOW = 0.3  # m/s
 
 Do = Callable[[GO2Controller], object]
 
@@ -49,6 +47,19 @@ def _nothing(_go2: GO2Controller) -> None: ...
 
 def _wait(go2: GO2Controller) -> None:
     go2.wait(1e6)
+
+
+def refusals(plant: WatchedPlant, time: float, call: Callable[[], object]) -> list[str]:
+    """What ``call`` by another thread at a ``time`` is refused with, once it has been."""
+    refused: list[str] = []
+
+    def intrude() -> None:
+        with pytest.raises(ModeError) as caught:
+            call()
+        refused.append(str(caught.value))
+
+    plant.once_at(time, lambda: in_thread(intrude).result(HANG_GUARD))
+    return refused
 
 
 # --- calls from other threads -----------------------------------------------------------------
@@ -71,15 +82,7 @@ def test_a_robot_that_leaves_walking_mode_takes_no_command(
 ) -> None:
     # While it came to rest for the call it took one more, walked on, and the call gave up.
     _trot(go2)
-    refused: list[str] = []
-
-    def intrude() -> None:
-        with pytest.raises(ModeError) as caught:
-            go2.move(SLOW)
-        refused.append(str(caught.value))
-
-    at = go2.state.time + delay
-    plant.once_at(at, lambda: in_thread(intrude).result(HANG_GUARD))
+    refused = refusals(plant, go2.state.time + delay, lambda: go2.move(SLOW))
     assert call(go2), go2.last_outcome.reason
     assert refused == ["move() needs walking mode, not moving: call walk() first"]
 
@@ -102,15 +105,7 @@ def test_a_second_play_is_refused_and_the_first_goes_on(
     go2: GO2Controller, plant: WatchedPlant
 ) -> None:
     assert go2.stand()
-    refused: list[str] = []
-
-    def intrude() -> None:
-        with pytest.raises(ModeError) as caught:
-            go2.play("bow", check=False)
-        refused.append(str(caught.value))
-
-    start = go2.state.time
-    plant.once_at(start + 1.5, lambda: in_thread(intrude).result(HANG_GUARD))
+    refused = refusals(plant, go2.state.time + 1.5, lambda: go2.play("bow", check=False))
     assert go2.play("nod", check=False)
     assert refused == ["play() while play() is still running"]
 

@@ -19,8 +19,7 @@ BESIDE = 1e-6  # [s] clearly not the event, and far shorter than any interval he
 TICK = 0.002  # [s] control period of the robot
 TROT = GAITS["trot"]
 
-GRID = 40
-"""Phases on a grid, so that two events either coincide or are far apart."""
+GRID = 40  #: Phases on a grid, so that two events either coincide or are far apart
 shares = st.integers(1, GRID - 1).map(lambda n: n / GRID)
 offsets = st.tuples(*[st.integers(0, GRID - 1).map(lambda n: n / GRID)] * 4)
 gaits = st.builds(Gait, st.just("some"), st.floats(0.2, 1.0), shares, offsets)

@@ -29,10 +29,8 @@ from motions import Timeline, compile_motion, find_motion, motion_names, save_mo
 
 ROOT = Path(__file__).resolve().parents[2]
 STORED = Path(__file__).parent / "stored"
-PLANS = {"kinematic": "nod", "dynamic": "jump_up"}
-"""Motions of the library whose plans are stored."""
-INSTANTS = 9
-"""At which the numbers of a plan are stored."""
+PLANS = {"kinematic": "nod", "dynamic": "jump_up"}  #: Motions of the library whose plans are stored
+INSTANTS = 9  #: At which the numbers of a plan are stored
 PACKAGES = (
     *("go2_wbc", "go2_wbc.plant", "motions", "motions.feasibility", "motions.dynamics"),
     *("motions.music", "viz", "controller", "controller.sweeps", "controller.demo"),

@@ -35,8 +35,7 @@ from tests.held.make import (
     toml,
 )
 
-ROUNDING = 1e-12
-"""Of sums that another version may add up in another order [m, rad, N]."""
+ROUNDING = 1e-12  #: Of sums that another version may add up in another order [m, rad, N]
 OURS = ("controller", "go2_wbc", "motions", "viz")
 Parameters = Mapping[str, str]
 

@@ -9,10 +9,8 @@ from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.reference import Reference
 from motions import CompiledPlan
 
-# rad; beyond the upper limit of a calf, -0.838.
-STRETCHED = -0.5
-# s; half the time in which a joint leaves its way and comes back.
-BUMP = 0.3
+STRETCHED = -0.5  # rad; beyond the upper limit of a calf, -0.838
+BUMP = 0.3  # s; half the time in which a joint leaves its way and comes back
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,17 +46,11 @@ STANDING = tuple(
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A motion of the library with one thing broken.
+    """A motion of the library with one thing broken."""
 
-    Attributes:
-        mutator: what was done to it.
-        line: the result.
-        broken: what the oracle sees, in words.
-    """
-
-    mutator: str
-    line: Timeline
-    broken: str
+    mutator: str  #: what was done to it
+    line: Timeline  #: the result
+    broken: str  #: what the oracle sees, in words
 
 
 def faults(model: RobotModel, count: int) -> list[Fault]:

@@ -22,8 +22,7 @@ from motions.language.keys import BODY_CHANNELS, BodyKey
 from motions.plan.quasi_static import LEAST_RAMP
 from tests.motions.plans import MODEL, library_plan
 
-STEP = 1e-3
-"""Time [s] beside a solved part that is left out."""
+STEP = 1e-3  #: Time [s] beside a solved part that is left out
 
 
 def test_there_are_motions_enough_and_each_says_what_it_is() -> None:

@@ -28,19 +28,12 @@ _BAD_CONFTEST, _NO_TESTS = 4, 5  # pytest's exit codes
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What tests said.
+    """What tests said."""
 
-    Attributes:
-        passed: whether all did.
-        failed: the first that did not, or how their process ended.
-        seconds: of CPU time.
-        is_late: whether they were stopped: their time was up.
-    """
-
-    passed: bool
-    failed: str
-    seconds: float
-    is_late: bool = False
+    passed: bool  #: whether all did
+    failed: str  #: the first that did not, or how their process ended
+    seconds: float  #: of CPU time
+    is_late: bool = False  #: whether they were stopped: their time was up
 
 
 class Sandbox:

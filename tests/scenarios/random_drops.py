@@ -15,37 +15,23 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand
 
-CONTROL_PERIOD = 0.004
-"""Seconds; twice the usual one: a drop takes half the time."""
-HEIGHT = 0.5
-"""Height [m] of the base at the start; no leg reaches the ground."""
-GREATEST_SPIN = 3.0
-"""Greatest angular velocity [rad/s] per axis at the start."""
-SETTLE_TIME = 1.5
-"""Time [s] for which the limp robot falls and comes to rest."""
-UPRIGHT = np.radians(6)
-"""Tilt [rad] below which a robot that stands is upright."""
+CONTROL_PERIOD = 0.004  #: Seconds; twice the usual one: a drop takes half the time
+HEIGHT = 0.5  #: Height [m] of the base at the start; no leg reaches the ground
+GREATEST_SPIN = 3.0  #: Greatest angular velocity [rad/s] per axis at the start
+SETTLE_TIME = 1.5  #: Time [s] for which the limp robot falls and comes to rest
+UPRIGHT = np.radians(6)  #: Tilt [rad] below which a robot that stands is upright
 
 
 @dataclass(frozen=True, slots=True)
 class Drop:
-    """One drop and what came of it.
+    """One drop and what came of it."""
 
-    Attributes:
-        seed: makes it repeatable.
-        q_joints: angles [rad] in which the legs came to rest.
-        tilt: of the trunk at rest [rad].
-        ok: whether the robot stands, by its own word and by the simulator's state.
-        reason: its own, in plain words.
-        duration: robot time [s] that it took.
-    """
-
-    seed: int
-    q_joints: tuple[float, ...]
-    tilt: float
-    ok: bool
-    reason: str
-    duration: float
+    seed: int  #: makes it repeatable
+    q_joints: tuple[float, ...]  #: angles [rad] in which the legs came to rest
+    tilt: float  #: of the trunk at rest [rad]
+    ok: bool  #: whether the robot stands, by its own word and by the simulator's state
+    reason: str  #: its own, in plain words
+    duration: float  #: robot time [s] that it took
 
     def __str__(self) -> str:
         """One line."""

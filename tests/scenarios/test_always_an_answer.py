@@ -15,8 +15,7 @@ from go2_wbc.planning.locomotion import LocomotionConfig
 from go2_wbc.planning.mpc import MpcConfig
 from tests.unchecked import run_trials
 
-SAMPLES = [("boxes", 19), ("pushes", 17), ("stops", 8)]
-"""Study and seed."""
+SAMPLES = [("boxes", 19), ("pushes", 17), ("stops", 8)]  #: Study and seed
 CONTRADICTORY = ("pushes", "stops")
 """Where the hard QP has no solution in some ticks; over boxes it had none until feet that stumble
 began another swing."""

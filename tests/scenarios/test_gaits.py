@@ -22,14 +22,12 @@ from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 from go2_wbc.robot.model import RobotModel
 
 FRICTION = 0.7
-SLOW = 0.05
-"""Share of the command by which the mean speed may be off."""
+SLOW = 0.05  #: Share of the command by which the mean speed may be off
 CHANGES = ("pace", "bound", "walk", "gallop", "pronk", "flying_trot", "trot")
 """One after the other, the robot walking all the time."""
 STRIDE = np.full(150, 1.0 / 150)
 """Ticks of 2 ms over which a speed is averaged: within a stride the bound slows down by 0.3 m/s."""
-FAST = 9.0
-"""m/s, rad/s: beyond every envelope, so that it is clipped to it."""
+FAST = 9.0  #: m/s, rad/s: beyond every envelope, so that it is clipped to it
 
 
 @pytest.mark.slow

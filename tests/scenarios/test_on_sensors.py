@@ -25,8 +25,7 @@ from go2_wbc.plant.terrain import Stairs
 from go2_wbc.robot.estimator import EstimatorConfig
 
 SPEED = 3.0  # m/s
-SPEED_BAR = 0.03
-"""Share of the speed by which its mean may be off."""
+SPEED_BAR = 0.03  #: Share of the speed by which its mean may be off
 PITCH_BAR = np.radians(0.8)
 """Of the mean error of the pitch, of which the accelerometer's bias makes 0.3 deg."""
 

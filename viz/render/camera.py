@@ -14,23 +14,14 @@ from viz.render.robot_meshes import PosedRobot
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """Where the picture is taken from.
+    """Where the picture is taken from."""
 
-    Attributes:
-        p_world_target: point in the middle of the picture [m].
-        azimuth: direction of the camera seen from the target, about world z [rad].
-        elevation: angle of the camera above the floor [rad].
-        distance: from target to camera [m].
-        size: width and height of the picture [px].
-        field_of_view: vertical opening angle [rad].
-    """
-
-    p_world_target: Float[np.ndarray, "3"]
-    azimuth: float
-    elevation: float
-    distance: float
-    size: tuple[int, int]
-    field_of_view: float = 0.5
+    p_world_target: Float[np.ndarray, "3"]  #: point in the middle of the picture [m]
+    azimuth: float  #: direction of the camera seen from the target, about world z [rad]
+    elevation: float  #: angle of the camera above the floor [rad]
+    distance: float  #: from target to camera [m]
+    size: tuple[int, int]  #: width and height of the picture [px]
+    field_of_view: float = 0.5  #: vertical opening angle [rad]
 
     @property
     def R_camera_world(self) -> Float[np.ndarray, "3 3"]:

@@ -29,20 +29,19 @@ _CREASE = np.deg2rad(30.0)
 class SnapshotCamera:
     """Takes pictures from aside, at a fixed distance from the robot."""
 
-    def __init__(self, robot: str = GO2, style: ShotStyle = STYLE, model_file: str = "") -> None:
+    def __init__(self, model_file: str) -> None:
         """Load the robot's meshes, of its own ``model_file`` if it has one."""
-        self._style = style
-        self._robot = PosedRobot(load_robot_visuals(robot, model_file).simplified(style.detail))
+        self._robot = PosedRobot(load_robot_visuals(GO2, model_file).simplified(STYLE.detail))
 
     def shoot(
         self, q: Float[np.ndarray, "19"], blocks: Sequence[Block] = ()
     ) -> UInt8[np.ndarray, "h w 3"]:
         """The robot in the configuration ``q``, among the blocks around it."""
-        style, target = self._style, q[:3] - [0.0, 0.0, _BELOW]
+        target = q[:3] - [0.0, 0.0, _BELOW]
         near = [block for block in blocks if math.dist(block.centre[:2], q[:2]) < _NEAR]
-        camera = Camera(target, style.azimuth, style.elevation, style.distance, style.size)
+        camera = Camera(target, STYLE.azimuth, STYLE.elevation, STYLE.distance, STYLE.size)
         surface = Surface.joined([self._robot.at(q), *map(_surface, near)])
-        return render(camera, surface, samples=style.samples)
+        return render(camera, surface, samples=STYLE.samples)
 
 
 def _surface(block: Block) -> Surface:

@@ -131,21 +131,14 @@ Poll = Callable[[], None]
 
 @dataclass(frozen=True, slots=True)
 class ServerSettings:
-    """How the robot is served.
+    """How the robot is served."""
 
-    Attributes:
-        namespace: of its topics and services.
-        realtime: at the pace of the wall clock; otherwise as fast as the CPU allows, with /clock.
-        viewer: open MuJoCo's window.
-        config: numbers of the engine, or a TOML file.
-        sensors: of the simulated robot, as of ``MujocoPlant``.
-    """
-
-    namespace: str = "robot1"
+    namespace: str = "robot1"  #: of its topics and services
     realtime: bool = False
-    viewer: bool = False
-    config: Config | Path | None = None
-    sensors: str = "ideal"
+    """At the pace of the wall clock; otherwise as fast as the CPU allows, with /clock."""
+    viewer: bool = False  #: open MuJoCo's window
+    config: Config | Path | None = None  #: numbers of the engine, or a TOML file
+    sensors: str = "ideal"  #: of the simulated robot, as of ``MujocoPlant``
 
 
 def serve(

@@ -219,27 +219,18 @@ _BOUNDS: Final = (
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE)
 class GuardConfig:
-    """When a command is softened, and when the robot is damped for good.
-
-    Attributes:
-        stale_limit: time [s] without a good ``rt/lowstate`` after which the robot is damped.
-        hang_limit: time [s] without a command of the controller after which it is.
-        tilt_limit: tilt [rad] of the trunk from which on it is.
-        joint_margin: angle [rad] beyond a joint's limit from which on it is.
-        ramp_time: time [s] over which torque and stiffness grow after the robot was limp.
-        limp_time: time [s] of limpness after which they have to grow anew.
-        lying_height: height [m] of the base over the ground below which the robot lies.
-        lying_tilt: tilt [rad] up to which it lies on its belly.
-    """
+    """When a command is softened, and when the robot is damped for good."""
 
     stale_limit: float = 0.03
-    hang_limit: float = 0.1
-    tilt_limit: float = 1.2
-    joint_margin: float = 0.15
+    """Time [s] without a good ``rt/lowstate`` after which the robot is damped."""
+    hang_limit: float = 0.1  #: time [s] without a command of the controller after which it is
+    tilt_limit: float = 1.2  #: tilt [rad] of the trunk from which on it is
+    joint_margin: float = 0.15  #: angle [rad] beyond a joint's limit from which on it is
     ramp_time: float = 0.5
-    limp_time: float = 0.3
-    lying_height: float = 0.16
-    lying_tilt: float = 0.5
+    """Time [s] over which torque and stiffness grow after the robot was limp."""
+    limp_time: float = 0.3  #: time [s] of limpness after which they have to grow anew
+    lying_height: float = 0.16  #: height [m] of the base over the ground below which the robot lies
+    lying_tilt: float = 0.5  #: tilt [rad] up to which it lies on its belly
 
 
 def is_passive(command: JointCommand) -> bool:

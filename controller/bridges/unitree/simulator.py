@@ -45,29 +45,17 @@ simulator that is late must not run ahead of its peer's commands to catch up."""
 
 @dataclass(frozen=True, slots=True)
 class SimulatorSettings:
-    """Where the simulator is found, and what it simulates.
+    """Where the simulator is found, and what it simulates."""
 
-    Attributes:
-        domain: DDS domain; 1 is that of simulators, as in ``unitree_mujoco``, 0 the robot's.
-        interface: network interface.
-        mjcf: a user's own Go2 model or scene.
-        friction: of the feet; None is the model's.
-        payload: extra mass [kg].
-        sensors: "ideal", "noisy" or "imu", as of ``MujocoPlant``.
-        seed: of the noise.
-        config: TOML with other numbers.
-        lockstep: under low-level control let time pass only command by command.
-    """
-
-    domain: int = 1
-    interface: str = LOOPBACK
-    mjcf: Path | None = None
-    friction: float | None = None
-    payload: float = 0.0
-    sensors: str = "ideal"
-    seed: int = 0
-    config: Path | None = None
-    lockstep: bool = False
+    domain: int = 1  #: DDS domain; 1 is that of simulators, as in ``unitree_mujoco``, 0 the robot's
+    interface: str = LOOPBACK  #: network interface
+    mjcf: Path | None = None  #: a user's own Go2 model or scene
+    friction: float | None = None  #: of the feet; None is the model's
+    payload: float = 0.0  #: extra mass [kg]
+    sensors: str = "ideal"  #: "ideal", "noisy" or "imu", as of ``MujocoPlant``
+    seed: int = 0  #: of the noise
+    config: Path | None = None  #: TOML with other numbers
+    lockstep: bool = False  #: under low-level control let time pass only command by command
 
 
 @final

@@ -26,38 +26,25 @@ TOUCH = 1.0  #: Force [N] between trunk and ground that counts as a touch
 
 @dataclass(frozen=True, slots=True)
 class TruthRecording:
-    """What MuJoCo said, one row per tick, at the end of that tick.
+    """What MuJoCo said, one row per tick, at the end of that tick."""
 
-    Attributes:
-        time: plant time [s].
-        q, v: configuration and velocity as in ``RobotState``.
-        rpy: attitude of the base [rad], yaw unwrapped.
-        tau: joint torques [N m] that acted.
-        tau_asked: those that the command asked for when the tick began [N m], before the motors'
-            limits; 0 in a row that no command led to.
-        foot_forces: normal forces [N] on the feet.
-        p_world_com, p_world_feet: centres of mass and of the feet [m], by MuJoCo.
-        p_world_contacts: contact points of the feet [m], nan in the air.
-        v_world_contacts: tangential velocity [m/s] of the feet's material there, 0 in the air.
-        trunk_force: normal force [N] between the trunk and the ground.
-        limb_force: the same for the legs without their feet.
-        touches_itself: whether two links touch that must not.
-    """
-
-    time: Float[np.ndarray, " n"]
-    q: Float[np.ndarray, "n 19"]
-    v: Float[np.ndarray, "n 18"]
-    rpy: Float[np.ndarray, "n 3"]
-    tau: Float[np.ndarray, "n 12"]
+    time: Float[np.ndarray, " n"]  #: plant time [s]
+    q: Float[np.ndarray, "n 19"]  #: configuration as in ``RobotState``
+    v: Float[np.ndarray, "n 18"]  #: velocity as in ``RobotState``
+    rpy: Float[np.ndarray, "n 3"]  #: attitude of the base [rad], yaw unwrapped
+    tau: Float[np.ndarray, "n 12"]  #: joint torques [N m] that acted
     tau_asked: Float[np.ndarray, "n 12"]
-    foot_forces: Float[np.ndarray, "n 4"]
-    p_world_com: Float[np.ndarray, "n 3"]
-    p_world_feet: Float[np.ndarray, "n 4 3"]
-    p_world_contacts: Float[np.ndarray, "n 4 3"]
+    """Those that the command asked for when the tick began [N m], before the motors' limits; 0 in a
+    row that no command led to."""
+    foot_forces: Float[np.ndarray, "n 4"]  #: normal forces [N] on the feet
+    p_world_com: Float[np.ndarray, "n 3"]  #: centre of mass [m], by MuJoCo
+    p_world_feet: Float[np.ndarray, "n 4 3"]  #: centres of the feet [m], by MuJoCo
+    p_world_contacts: Float[np.ndarray, "n 4 3"]  #: contact points of the feet [m], nan in the air
     v_world_contacts: Float[np.ndarray, "n 4 3"]
-    trunk_force: Float[np.ndarray, " n"]
-    limb_force: Float[np.ndarray, " n"]
-    touches_itself: Bool[np.ndarray, " n"]
+    """Tangential velocity [m/s] of the feet's material there, 0 in the air."""
+    trunk_force: Float[np.ndarray, " n"]  #: normal force [N] between the trunk and the ground
+    limb_force: Float[np.ndarray, " n"]  #: the same for the legs without their feet
+    touches_itself: Bool[np.ndarray, " n"]  #: whether two links touch that must not
 
     def part(self, rows: slice | Int[np.ndarray, " m"]) -> TruthRecording:
         """Some of the ticks."""

@@ -285,8 +285,8 @@ def _write(file: Path, state: Float[np.ndarray, " size"]) -> None:
     try:
         file.parent.mkdir(exist_ok=True)
         if len(list(file.parent.iterdir())) >= _KEPT_STATES:
-            shutil.rmtree(file.parent, ignore_errors=True)
-            file.parent.mkdir(exist_ok=True)
+            shutil.rmtree(file.parent)
+            file.parent.mkdir()
         write_atomically(file, numbers + hashlib.sha256(numbers).digest())
     except (OSError, ConfigError):
         return

@@ -11,8 +11,7 @@ from tests.controller.bridges.ros2_graph import HAS_ROS2, isolate
 from tests.controller.bridges.ros2_probe import WatchingProbe
 from tests.controller.bridges.ros2_processes import joined, serving
 
-PACED_ATTEMPTS = 3
-"""How often a busy machine gets the chance to keep real time for a demo."""
+PACED_ATTEMPTS = 3  #: How often a busy machine gets the chance to keep real time for a demo
 Done = subprocess.CompletedProcess[str]
 
 if HAS_ROS2:

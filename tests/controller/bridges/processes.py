@@ -15,8 +15,7 @@ from typing import Final, final
 from controller.sweeps.trials import TrialFailed
 from go2_wbc.errors import BridgeError
 
-START_LIMIT: Final = 60.0
-"""Time [s] in which a process must be ready; a loaded machine needs many."""
+START_LIMIT: Final = 60.0  #: Time [s] in which a process must be ready; a loaded machine needs many
 PROGRAM: Final = (sys.executable, "-m", "controller.cli.main")
 REALTIME: Final = ("chrt", "-f", "10")
 """What lets a process keep its pace on a busy machine, where the system allows it."""

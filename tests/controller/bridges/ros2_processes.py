@@ -28,8 +28,7 @@ if TYPE_CHECKING:
 
 DISCOVERY: Final = 20.0
 """Time [s] in which processes must find each other; half a second on an idle machine."""
-ANSWER: Final = 60.0
-"""Time [s] in which a call must be answered; four on an idle machine."""
+ANSWER: Final = 60.0  #: Time [s] in which a call must be answered; four on an idle machine
 
 
 @contextmanager

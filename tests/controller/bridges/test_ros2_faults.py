@@ -31,12 +31,9 @@ NOTICE_LIMIT: Final = 15.0
 """Wall time [s] in which a client must hear that its server has gone; five on an idle machine."""
 BRAKING_WAY: Final = 0.5
 """Way [m] within which a robot stops that walked 0.3 m/s: half a second of silence, and strides."""
-REST_TIME, REST_WAY = 0.5, 0.01
-"""A robot rests if it moves by less than this [m] in this time [s]."""
-FLOOD_RATE: Final = 1500.0
-"""Commands per second below which a flood was none."""
-REFUSED: Final = 3
-"""Exit code of a server that cannot serve."""
+REST_TIME, REST_WAY = 0.5, 0.01  #: A robot rests if it moves by less than this [m] in this time [s]
+FLOOD_RATE: Final = 1500.0  #: Commands per second below which a flood was none
+REFUSED: Final = 3  #: Exit code of a server that cannot serve
 GARBAGE: Final = (math.nan, math.inf, -math.inf)
 HUGE: Final = 1e300
 CLIENT: Final = """
@@ -78,15 +75,10 @@ pytestmark = needs_ros2
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A robot's namespace, and what is started there; it ends with the scene.
+    """A robot's namespace, and what is started there; it ends with the scene."""
 
-    Attributes:
-        probe: watches the robot.
-        exits: what is to be ended.
-    """
-
-    probe: WatchingProbe
-    exits: ExitStack
+    probe: WatchingProbe  #: watches the robot
+    exits: ExitStack  #: what is to be ended
 
     def serve(self, says: str = "serving /") -> Process:
         """A server; see ``serving``."""

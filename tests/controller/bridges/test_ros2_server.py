@@ -18,8 +18,7 @@ from tests.controller.bridges.ros2_processes import ANSWER, DISCOVERY, serving
 pytestmark = needs_ros2
 
 AT_REST = 0.008  # m in half a second: the trunk still goes over its feet, at 10 mm/s
-SPEED_TOLERANCE = 0.02
-"""Share of the commanded speed, over several strides."""
+SPEED_TOLERANCE = 0.02  #: Share of the commanded speed, over several strides
 DRIVES = 4
 """How often a busy machine gets the chance to send commands without a gap of half a second."""
 RATE_TOLERANCE = 0.05

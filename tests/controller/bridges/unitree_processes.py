@@ -29,13 +29,10 @@ if TYPE_CHECKING:
     from controller.bridges.unitree.rpc import Client
 
 LOOPBACK: Final = "lo"
-LIMIT: Final = 60.0
-"""Time [s] that only ends what hangs."""
-SPEED: Final = 0.5
-"""Of ``Move`` and of the trot [m/s]."""
+LIMIT: Final = 60.0  #: Time [s] that only ends what hangs
+SPEED: Final = 0.5  #: Of ``Move`` and of the trot [m/s]
 MOVE: Final = json.dumps({"x": SPEED, "y": 0.0, "z": 0.0})
-DOMAINS: Final = range(100, 230)
-"""DDS domains of which each scene takes one."""
+DOMAINS: Final = range(100, 230)  #: DDS domains of which each scene takes one
 DISCOVERY_PORTS: Final = (7400, 7401)
 """UDP ports that a participant of domain 0 shares; 250 more for each domain (RTPS 2.5, 9.6.1)."""
 _LOCK_PORT: Final = 27000

@@ -41,8 +41,7 @@ def take(
     return 0
 
 
-given: list[object] = []
-"""What the function was called with."""
+given: list[object] = []  #: What the function was called with
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """A shell that has read what ``completion`` prints completes commands, options and motions."""
 
-from __future__ import annotations
-
 import shlex
 import shutil
 import subprocess

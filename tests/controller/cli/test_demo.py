@@ -293,6 +293,8 @@ def test_the_table_marks_every_step_beside_what_was_measured_with_a_dash_for_not
     assert text.count("✗") == 1
     assert "\n     the paw was not held at 0.62 m\n" in text
     assert "7 of 8 steps done." in text
+    totals = [line.split() for line in text.splitlines() if "on three legs: least" in line]
+    assert [total[-2:] for total in totals] == [["0.060", "m"], ["40", "N"]]
     text = render(run_demo(FakeGo2(speed_share=0.95)), "utf-8")
     row = next(line for line in text.splitlines() if "mean speed" in line)
     assert row.split()[-3:] == ["0.200", "0.190", "m/s"]

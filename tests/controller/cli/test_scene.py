@@ -15,8 +15,7 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.recording import Recording
 from tests.controller.cli.conftest import Run
 
-STANDING = 0.306
-"""m; height of the base of a robot that stands on level ground."""
+STANDING = 0.306  #: m; height of the base of a robot that stands on level ground
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 """``go2-wbc studio``: which file it edits, and what it never writes over."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

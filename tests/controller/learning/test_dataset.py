@@ -19,8 +19,7 @@ from controller.observation import OBSERVATION
 from go2_wbc.errors import CommandError, ConfigError
 
 EPISODES = 3
-MINUTES = EPISODES * 2.4 / 60.0
-"""That many times a bow."""
+MINUTES = EPISODES * 2.4 / 60.0  #: That many times a bow
 
 
 @pytest.fixture(scope="module")

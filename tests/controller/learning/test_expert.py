@@ -12,8 +12,7 @@ from controller.observation import OBSERVATION, RATE, TARGETS, Actuation
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.recording import Recording
 
-TICKS = 10
-"""Of the control loop in a row."""
+TICKS = 10  #: Of the control loop in a row
 EDGE = 0.03
 """Share of rows in which a foot changes between the row's beginning and the schedule's edge."""
 

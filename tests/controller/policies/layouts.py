@@ -1,7 +1,5 @@
 """A sidecar with every term, and the orders of joints of well-known frameworks."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from controller.policies.sidecar import SIZES, CommandRanges, Sidecar, Term

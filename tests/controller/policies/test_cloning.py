@@ -5,6 +5,7 @@ import pytest
 
 from controller.policies import TROT, Course, Policy, Sidecar, clone
 from controller.policies.cloning import SHARES, Lesson, Teacher
+from controller.policies.network import Network
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.robot.state import JointCommand, RobotState
 
@@ -58,3 +59,9 @@ def test_a_course_goes_through_its_rounds_and_is_the_same_again() -> None:
     assert first[1].stayed_up <= 2.0
     for part, same in zip(first[-1].network.parts, again[-1].network.parts, strict=True):
         np.testing.assert_array_equal(part, same)
+
+
+def test_the_error_that_is_told_is_an_angle_of_the_joints(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Network, "fit", lambda *_: 0.09)  # mean square, of actions
+    (only,) = clone(SIDE, Course(rounds=1, seconds=0.1, units=4))
+    assert only.error == pytest.approx(0.3 * np.abs(SIDE.action_scale).mean())

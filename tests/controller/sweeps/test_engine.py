@@ -15,8 +15,7 @@ from controller.sweeps.engine import Worker, order_of
 from controller.sweeps.sweep_file import Row
 from tests.controller.sweeps import swept
 
-HANG_GUARD = 120.0
-"""Seconds after which a process that should have ended fails its test."""
+HANG_GUARD = 120.0  #: Seconds after which a process that should have ended fails its test
 
 
 def asked(function: Callable[[int], object], tmp_path: Path) -> Row:

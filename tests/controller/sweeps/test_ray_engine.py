@@ -21,8 +21,7 @@ pytestmark = pytest.mark.skipif(
     find_spec("ray") is None and not IS_REQUIRED,
     reason="Ray is not installed: `make test-cluster` installs it",
 )
-NOWHERE = "127.0.0.1:9"
-"""An address at which no cluster listens: the port of the discard protocol."""
+NOWHERE = "127.0.0.1:9"  #: An address at which no cluster listens: the port of the discard protocol
 
 
 @pytest.fixture(scope="module")

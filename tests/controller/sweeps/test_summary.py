@@ -11,8 +11,7 @@ from controller.sweeps.sweep_file import columns_of
 
 TABLE = {(0, 10): (0.0, 0.3085), (10, 10): (0.6915, 1.0), (5, 10): (0.1871, 0.8129)}
 """Clopper and Pearson's intervals at 95 %, from printed tables."""
-PRINTED = 5e-5
-"""Half of the last digit of the table."""
+PRINTED = 5e-5  #: Half of the last digit of the table
 
 
 @pytest.mark.parametrize(("seen", "interval"), TABLE.items(), ids=str)

@@ -20,8 +20,7 @@ from go2_wbc.errors import CommandError, ConfigError, SweepError
 from tests.controller.sweeps import swept
 
 ROOT = Path(__file__).resolve().parents[3]
-HANG_GUARD = 120.0
-"""Seconds after which a process that should have ended fails its test."""
+HANG_GUARD = 120.0  #: Seconds after which a process that should have ended fails its test
 SWEEP = (
     "from controller import sweep; from tests.controller.sweeps import swept; "
     "sweep(swept.slow, {n}, workers=2, out={out!r})"

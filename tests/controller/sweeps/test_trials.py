@@ -59,8 +59,7 @@ def test_a_trial_is_drawn_by_its_seed_inside_its_ranges() -> None:
 
 
 SEEDS = 3
-SLOW_TROT = 0.05
-"""Error of the mean velocity [m/s] that is no gross mistake."""
+SLOW_TROT = 0.05  #: Error of the mean velocity [m/s] that is no gross mistake
 
 
 @pytest.fixture(scope="module")

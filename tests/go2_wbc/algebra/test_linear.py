@@ -12,6 +12,7 @@ from go2_wbc.algebra.linear import (
     quaternion_of,
     rotation_by,
     rotation_vector,
+    solve_linear,
     triple,
     turned,
     turned_back,
@@ -47,3 +48,14 @@ def test_a_quaternion_is_that_of_its_rotation_whichever_part_is_largest() -> Non
         quaternion_of(rotation.as_matrix(), q)
         truth = rotation.as_quat()
         np.testing.assert_allclose(q * np.sign(q @ truth), truth, atol=1e-14)
+
+
+def test_equations_are_solved_where_the_diagonal_is_zero_too_and_singular_ones_are_told() -> None:
+    rng = np.random.default_rng(9)
+    for n in (1, 3, 6):
+        for M in (rng.normal(size=(n, n)), rng.permutation(np.eye(n)), np.eye(n)[::-1] * 1e-3):
+            b = rng.normal(size=(n, 2))
+            A = np.hstack([M, b])
+            assert solve_linear(A, n)
+            np.testing.assert_allclose(A[:, n:], np.linalg.solve(M, b), rtol=1e-9)
+    assert not solve_linear(np.array([[1.0, 2.0, 1.0], [2.0, 4.0, 1.0]]), 2)

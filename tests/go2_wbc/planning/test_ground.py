@@ -1,7 +1,5 @@
 """The ground below a walking robot: its plane, how rough it is, and its friction."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Swing feet: where they start, how high they go, where they land, and when they stand."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

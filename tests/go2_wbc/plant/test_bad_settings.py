@@ -62,6 +62,7 @@ def edited(old: str, new: str) -> Callable[[str], str]:
 @pytest.mark.parametrize(
     ("edit", "message"),
     [
+        (edited("FL_hip_joint", "front_left"), "lacks: joint FL_hip_joint"),
         (edited('type="revolute"', 'type="continuous"'), "must be revolute, it is continuous"),
         (edited('effort="23.7"', 'effort="0"'), "no valid effort limit"),
         (edited('effort="23.7"', 'effort="strong"'), "no valid effort limit"),

@@ -17,8 +17,7 @@ from tests.engine_helpers import random_state
 LOADED = World(
     friction=0.7, payload=4.0, payload_place=(0.08, -0.05, 0.1), mass_scale=1.1, joint_friction=1.5
 )
-CLOSE = 1e-9
-"""kg, m, kg m^2: one model computed twice."""
+CLOSE = 1e-9  #: kg, m, kg m^2: one model computed twice
 DAMPED = 0.01
 """N m: of the joints that have come to rest under the damping that is on its way at the start."""
 

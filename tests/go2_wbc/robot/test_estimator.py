@@ -16,7 +16,14 @@ from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.state import JointCommand, RobotState
-from go2_wbc.robot.state_filter import FEET, GYRO_BIAS, EstimateError
+from go2_wbc.robot.state_filter import (
+    FEET,
+    FORCE_BIAS,
+    GYRO_BIAS,
+    THETA,
+    VELOCITY,
+    EstimateError,
+)
 from tests.engine_helpers import STAND_JOINTS
 from tests.engine_helpers import standing_reading as reading
 
@@ -180,6 +187,22 @@ def test_the_covariance_stays_symmetric() -> None:
     estimator.update(reading(0.002))
     P = estimator.save()["state"].filter.P
     assert np.abs(P - P.T).max() < ROUNDING
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.02])
+def test_a_turn_that_was_none_is_taken_back_and_what_it_touched_is_doubted(turn: float) -> None:
+    estimator = StateEstimator(RobotModel())
+    estimator.update(reading(0.0))
+    x, P = estimator._state.filter.x, estimator._state.filter.P
+    before = np.array(P)
+    estimator._turn_back(np.array([turn, 0.0, 0.0]))
+    doubted = np.zeros(len(P))
+    doubted[THETA : THETA + 2], doubted[VELOCITY : VELOCITY + 3] = 0.05**2, 0.2**2
+    if not turn:  # it was the accelerometer
+        doubted[FORCE_BIAS : FORCE_BIAS + 3] = 0.2**2
+    np.testing.assert_allclose(P - before, np.diag(doubted), atol=ROUNDING)
+    roll = 2.0 * np.arctan2(x.quaternion[0], x.quaternion[3])
+    assert roll == pytest.approx(-turn, abs=1e-9)
 
 
 def after_a_start(speed: float, accelerometer: list[float], forces: float) -> list[RobotState]:

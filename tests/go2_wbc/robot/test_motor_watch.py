@@ -8,8 +8,7 @@ from go2_wbc.robot.motor_watch import MotorWatch
 from go2_wbc.robot.state import JointCommand, RobotState
 
 DT = 0.002
-LATE = 7
-"""Ticks, 14 ms: by so much may a command act late."""
+LATE = 7  #: Ticks, 14 ms: by so much may a command act late
 
 
 def watched(share: float, *, late: int = 0, amplitude: float = 8.0, ticks: int = 500) -> MotorWatch:

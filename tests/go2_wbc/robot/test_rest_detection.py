@@ -131,8 +131,7 @@ def test_a_dropped_robot_stands_up_on_its_own_sensors(seed: int) -> None:
 
 C, G, DT = EstimatorConfig(), 9.81, 0.002
 UP = [0.0, 0.0, G]
-CARRYING = 0.5 * G
-"""What a trunk feels at least if something carries it."""
+CARRYING = 0.5 * G  #: What a trunk feels at least if something carries it
 
 
 def read(

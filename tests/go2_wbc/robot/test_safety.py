@@ -21,10 +21,8 @@ FOOT_RADIUS = find_profile().foot_radius
 # m; how closely few points can stand for the mesh of the trunk.
 POINT_TOLERANCE = 0.01
 TICK = 0.01
-# rad; the foot is 89 mm below the hip.
-FOLDED_LEG = (0.0, 1.36, -2.72)
-# rad; 20 mm more below the trunk.
-NEARLY_FOLDED_LEG = (0.0, 1.31, -2.64)
+FOLDED_LEG = (0.0, 1.36, -2.72)  # rad; the foot is 89 mm below the hip
+NEARLY_FOLDED_LEG = (0.0, 1.31, -2.64)  # rad; 20 mm more below the trunk
 
 
 MODEL = RobotModel()
@@ -182,40 +180,32 @@ def test_where_the_belly_may_be_down_it_may_lie_for_ever(falls: FallDetector) ->
     assert falls.reason(on_the_belly(MODEL, 2.0), 0.5, 0.0, may_lie=False) is None
 
 
-def test_a_trunk_far_below_where_it_should_be_is_a_fall_after_the_limit(
-    falls: FallDetector,
+@pytest.mark.parametrize(
+    ("what", "told", "may_lie"),
+    [
+        ("sink", "13 cm below where it should be", False),
+        ("lean", "tilted 30 deg from where it should be", False),
+        ("lean", "tilted 30 deg from where it should be", True),
+    ],
+)
+def test_a_trunk_that_is_off_where_it_should_be_is_a_fall_after_the_limit(
+    falls: FallDetector, *, what: str, told: str, may_lie: bool
 ) -> None:
-    config = SafetyConfig()
-    sag, just_less = config.sink_limit + 0.01, config.sink_limit - 0.01
-    assert falls.reason(standing(MODEL, 0.0), sag, 0.0, may_lie=False) is None
-    assert falls.reason(standing(MODEL, 0.2), just_less, 0.0, may_lie=False) is None
-    assert falls.reason(standing(MODEL, 0.3), sag, 0.0, may_lie=False) is None
-    assert (
-        falls.reason(standing(MODEL, 0.3 + config.sink_limit_time), sag, 0.0, may_lie=False) is None
-    )
-    late = standing(MODEL, 0.31 + config.sink_limit_time)
-    reason = falls.reason(late, sag, 0.0, may_lie=False)
-    assert reason == "fell at t=0.61 s: trunk 13 cm below where it should be"
-    falls.begin()
-    assert falls.reason(late, sag, 0.0, may_lie=False) is None
+    limit, longest = (getattr(CONFIG, f"{what}_limit{end}") for end in ("", "_time"))
 
+    def reason(time: float, off: float) -> str | None:
+        sag, lean = (off, 0.0) if what == "sink" else (0.0, off)
+        return falls.reason(standing(MODEL, time), sag, lean, may_lie=may_lie)
 
-@pytest.mark.parametrize("may_lie", [False, True])
-def test_a_trunk_that_leans_from_where_it_should_be_is_a_fall_after_the_limit(
-    falls: FallDetector, *, may_lie: bool
-) -> None:
-    config = SafetyConfig()
-    lean, just_less = config.lean_limit + 0.01, config.lean_limit - 0.01
-    for time in np.arange(0.0, 1.0, 0.1).tolist():
-        assert falls.reason(standing(MODEL, time), 0.0, just_less, may_lie=may_lie) is None
-    assert falls.reason(standing(MODEL, 1.0), 0.0, lean, may_lie=may_lie) is None
-    assert falls.reason(standing(MODEL, 1.2), 0.0, just_less, may_lie=may_lie) is None
-    assert falls.reason(standing(MODEL, 1.3), 0.0, lean, may_lie=may_lie) is None
-    late = standing(MODEL, 1.31 + config.lean_limit_time)
-    reason = falls.reason(late, 0.0, lean, may_lie=may_lie)
-    assert reason == "fell at t=1.61 s: trunk tilted 30 deg from where it should be"
+    much, just_less = limit + 0.01, limit - 0.01
+    for time in np.arange(-1.0, 0.0, 0.1).tolist():
+        assert reason(time, just_less) is None
+    for time, off in ((0.0, much), (0.2, just_less), (0.3, much), (0.3 + longest, much)):
+        assert reason(time, off) is None
+    late = 0.31 + longest
+    assert reason(late, much) == f"fell at t={late:.2f} s: trunk {told}"
     falls.begin()
-    assert falls.reason(late, 0.0, lean, may_lie=may_lie) is None
+    assert reason(late, much) is None
 
 
 @pytest.mark.parametrize("name", [name for name in SafetyConfig.__slots__])

@@ -32,8 +32,7 @@ MODEL = RobotModel()
 TICK = 0.002
 STEP, HOP = step_plan(MODEL, Leg.FR, 0.05), hop_plan(MODEL, 0.1)
 GROUND = float(MODEL.snapshot(state_of(standing_q())).p_world_feet[0, 2]) - FOOT_RADIUS
-CORRECTION = 5e-3
-"""What the steady-state correction has added before [m]."""
+CORRECTION = 5e-3  #: What the steady-state correction has added before [m]
 
 
 class Follower:
@@ -134,8 +133,7 @@ def test_where_a_foot_has_landed_is_told() -> None:
 DOWN, IN_AIR = False, True
 BEFORE, AFTER = EARLIEST - 0.01, EARLIEST + 0.01
 """Share of a swing that is over when contacts do not count yet, and do."""
-IN_TIME, TOO_LATE = TIME_OUT - 0.01, TIME_OUT + 0.01
-"""Time [s] since a foot should have come down."""
+IN_TIME, TOO_LATE = TIME_OUT - 0.01, TIME_OUT + 0.01  #: Time [s] since a foot should have come down
 ST, SW, JO = LegTask
 TABLE = (
     # it is, what the plan asked before, asks now, since, contact; it will be, is asked to, missed
@@ -160,8 +158,7 @@ TABLE = (
     (DOWN, JO, SW, 0.0, False, IN_AIR, SW, 0),
     (DOWN, JO, ST, 0.0, False, DOWN, ST, 0),
 )
-HIGHER = 0.05
-"""By which the plan takes the ground for higher than it is [m]."""
+HIGHER = 0.05  #: By which the plan takes the ground for higher than it is [m]
 LOAD = StanceLoad(0.1, 3.0, 300.0)
 
 

@@ -17,8 +17,7 @@ from motions.plan.compiled_plan import CompiledPlan
 from tests.compiled import assert_plain_is_compiled
 
 ROUNDING = 1e-12
-STEP = 1e-6
-"""Time [s] of finite differences, which are 1e-6 of the rates wrong."""
+STEP = 1e-6  #: Time [s] of finite differences, which are 1e-6 of the rates wrong
 DIFFERENCES: dict[str, Any] = {"rtol": 1e-5, "atol": 1e-5}
 LOAD = StanceLoad(0.1, 3.0, 300.0)
 

@@ -17,8 +17,7 @@ from tests.engine_helpers import holding_reference, random_state
 MODEL = RobotModel()
 REAR = (LegTask.SWING, LegTask.SWING, LegTask.STANCE, LegTask.STANCE)
 ANCHOR = Anchor(np.array([0.3, -0.2, 0.05]), 0.8)
-SMALL = 1e-4
-"""Size of the errors that first order is good for."""
+SMALL = 1e-4  #: Size of the errors that first order is good for
 
 
 def moment(seed: int) -> tuple[Snapshot, Reference, np.random.Generator]:

@@ -22,8 +22,7 @@ JOINT_WORDS = [name.removesuffix("_joint") for name in JOINT_NAMES]
 MODEL = RobotModel()
 PLAIN = WholeBodyController(MODEL)
 STANDING = tuple(mode for mode in MODES if mode.count(LegTask.STANCE) > 1)
-LIVELY = 2.0
-"""Scale [m/s^2] of the accelerations that are asked for."""
+LIVELY = 2.0  #: Scale [m/s^2] of the accelerations that are asked for
 Tick = tuple[Snapshot, Reference]
 
 

@@ -36,8 +36,7 @@ from tests.motions.doctored import (
 
 STAND_HEIGHT = find_profile().stand_height
 
-# m, N, N m; of quantities that two ways of calculating give, one of them by a spline.
-EXACT = 1e-6
+EXACT = 1e-6  # m, N, N m; of quantities that two ways of calculating give, one of them by a spline
 
 
 @pytest.fixture(scope="module")
@@ -310,10 +309,8 @@ def test_a_table_fits_80_columns_and_names_every_check(
     assert lines[-1].startswith("Chance that it is done so: ")
 
 
-_WEIGHT_TOLERANCE = 1.0
-"""[N] What the even share of the load takes away from the wrench, at rest."""
-_UNLOADED = 1e-3
-"""[N] Solver's tolerance at a bound."""
+_WEIGHT_TOLERANCE = 1.0  #: [N] What the even share of the load takes away from the wrench, at rest
+_UNLOADED = 1e-3  #: [N] Solver's tolerance at a bound
 
 
 @pytest.fixture(scope="module")

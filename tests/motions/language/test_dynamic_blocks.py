@@ -14,8 +14,7 @@ from motions import Timeline, deg
 from motions.dynamics.phases import Phase
 from motions.language.keys import PhaseKey
 
-_TIE = 1e-9
-"""[s] Rounding of sums."""
+_TIE = 1e-9  #: [s] Rounding of sums
 
 
 def blocks(line: Timeline) -> list[PhaseKey]:

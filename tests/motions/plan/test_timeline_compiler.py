@@ -16,10 +16,8 @@ from motions.plan.compiled_plan import FORCE_WEIGHT
 from motions.plan.timeline_compiler import LEAD, pieces_to_repair, without_vain_shifts
 from motions.plan.trajectory import Trajectory, trajectory_of
 
-_SAME = 1e-9
-"""Rounding of sums, m, rad, m/s and rad/s."""
-_LANDED = 0.01
-"""[m] What a plan may land beside the place that is asked, here; it reports how far."""
+_SAME = 1e-9  #: Rounding of sums, m, rad, m/s and rad/s
+_LANDED = 0.01  #: [m] What a plan may land beside the place that is asked, here; it reports how far
 
 
 @pytest.fixture(scope="module")

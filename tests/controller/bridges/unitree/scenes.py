@@ -22,14 +22,11 @@ from tests.controller.bridges.unitree_processes import (
     tilt_of,
 )
 
-FLOOD: Final = 5000.0
-"""Samples per second."""
-UPRIGHT: Final = 0.35
-"""Tilt [rad] below which a robot that stands or lies is upright."""
+FLOOD: Final = 5000.0  #: Samples per second
+UPRIGHT: Final = 0.35  #: Tilt [rad] below which a robot that stands or lies is upright
 STANDS, LIES = 0.25, 0.13
 """Height [m] of the base above which the robot stands, below which it lies."""
-DAMPED: Final = encode_message(low_cmd_message(JointCommand.damping(3.0)))
-"""A good ``rt/lowcmd``."""
+DAMPED: Final = encode_message(low_cmd_message(JointCommand.damping(3.0)))  #: A good ``rt/lowcmd``
 
 
 def garbage() -> list[bytes]:

@@ -28,10 +28,8 @@ LIMIT = 120.0  # s; only ends a test that hangs
 # s; the default of 1 s is kept by an idle machine, a loaded one pauses processes for longer.
 PATIENT = 5.0
 GRAVITY = pytest.approx(9.8, abs=0.5)
-# rad; joint servos of 60 N m/rad sag by about 0.12 under the robot's weight.
-SAG = 0.2
-# Checked in either direction; of ours a busy peer may miss some.
-MESSAGES = 1500
+SAG = 0.2  # rad; joint servos of 60 N m/rad sag by about 0.12 under the robot's weight
+MESSAGES = 1500  # Checked in either direction; of ours a busy peer may miss some
 # What own_low_level.py commands, in Unitree's order of joints.
 ANGLES = [0.4, 0.5, 0.6, 0.1, 0.2, 0.3, 1.0, 1.1, 1.2, 0.7, 0.8, 0.9]
 # A network of one's own; who is not root is root in a user namespace.

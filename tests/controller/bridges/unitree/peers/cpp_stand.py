@@ -13,8 +13,7 @@ unitree = importlib.import_module("unitree_interface")
 LYING = [0.0, 1.36, -2.65] * 4
 STANDING = [0.0, 0.67, -1.3] * 4
 RISE, HOLD, PERIOD, LIMIT = 2.0, 1.0, 0.002, 30.0
-# rad; joint servos of 60 N m/rad sag by about 0.12 under the robot's weight.
-SAG = 0.18
+SAG = 0.18  # rad; joint servos of 60 N m/rad sag by about 0.12 under the robot's weight
 
 
 def main() -> None:
