@@ -90,8 +90,7 @@ class Maker:
         found, others, start = dict[str, int](), self._others[folder], f"{folder}{os.sep}"
         for name in sys.modules.keys() - others:
             file = getattr(sys.modules[name], "__file__", None) or ""
-            path = Path(file)
-            if file.startswith(start) and not PACKAGES & {*path.parts}:
+            if file.startswith(start) and not PACKAGES & {*(path := Path(file)).parts}:
                 found[name] = path.stat().st_mtime_ns if path.exists() else 0
             else:
                 others.add(name)

@@ -34,6 +34,7 @@ def serve(pipe: Connection) -> None:
         from controller.studio.making import Maker
         from motions import FeasibilityChecker, Timeline
         from motions.memory import Memory
+        from viz.replay import page_data  # noqa: F401 - takes its time, which no file has to answer for
 
         checker = FeasibilityChecker(memory=Memory())  # most of a motion is as it was
         maker = Maker()
@@ -51,7 +52,6 @@ def _answer(
 ) -> Answer | StudioError:
     from controller.report_view import planned, slider
     from motions import suggest
-    from viz.replay.page_data import prepared
 
     has_run = False
     try:
@@ -77,6 +77,8 @@ def _answer(
             pipe.send("failed")
         is_ours = isinstance(error, Go2WbcError)
         return StudioError(str(error) if is_ours else "the file ends the program")
+    from viz.replay.page_data import prepared
+
     sliders = tuple(slider(item, values.get(item.name, item.default)) for item in motion.parameters)
     bars = tuple(_bars(Source(order.data), str(order.path), made.marks, content))
     content = replace(content, sliders=sliders)
