@@ -113,6 +113,7 @@ AS_WRITTEN, NEAREST = PHYSICS = ("as_written", "nearest")
 """What may be made of a motion that the robot cannot do: nothing, or the nearest that it can."""
 
 _KeyType = TypeVar("_KeyType", bound=Key)
+_Some = TypeVar("_Some", bound="TimelineData")
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,7 +244,8 @@ class TimelineData:
 
     def _longer(self, keys: Sequence[Key], cursor: float) -> Self:
         first = min((key.start for key in keys), default=self.cursor)
-        longer = self.unchecked(
+        longer = unchecked(
+            self,
             keys=(*self.keys, *keys),
             cursor=max(cursor, self.floor),
             last_start=first,
@@ -252,14 +254,6 @@ class TimelineData:
         longer._require_length(longer.end)
         _require_no_overlap([*(key for key in self.keys if key.end >= first - SAME), *keys])
         return longer
-
-    def unchecked(self, **values: object) -> Self:
-        """A copy with other ``values``, of which it is known that they are valid."""
-        other = object.__new__(type(self))
-        for name in _FIELDS:
-            value = values[name] if name in values else getattr(self, name)
-            object.__setattr__(other, name, value)
-        return other
 
     def _joined(self, other: TimelineData, start: float) -> Self:
         return self._longer([key.later(start) for key in other.keys], start + other.end)
@@ -273,6 +267,15 @@ class TimelineData:
 
 
 _FIELDS = tuple(item.name for item in fields(TimelineData))
+
+
+def unchecked(timeline: _Some, **values: object) -> _Some:
+    """A copy with other ``values``, of which it is known that they are valid."""
+    other: _Some = object.__new__(type(timeline))
+    for name in _FIELDS:
+        value = values[name] if name in values else getattr(timeline, name)
+        object.__setattr__(other, name, value)
+    return other
 
 
 def distinct(*instants: float) -> tuple[float, ...]:

@@ -24,7 +24,7 @@ from go2_wbc.curves import Ease
 from go2_wbc.legs import Leg
 from motions.language.keys import BalanceShift, BodyKey, Key, LegKey, Mark, PhaseKey, StepKey
 from motions.language.timeline import Timeline
-from motions.language.timeline_data import TimelineData
+from motions.language.timeline_data import TimelineData, unchecked
 
 TRUNK, ROBOT, TIME = "trunk", "robot", "time"
 """What a call that moves no single foot belongs to: a jump is of the whole robot, a pause, a tempo
@@ -112,7 +112,7 @@ def traced() -> Iterator[None]:
             place = (frame.f_code.co_filename, _end_of(frame.f_code, frame.f_lasti))
             done = Call(name, *place, runs[place], given, tuple(callers(frame)), before)
             runs[place] += 1
-            return after.unchecked(keys=(*after.keys, _mark(before, after, done)))
+            return unchecked(after, keys=(*after.keys, _mark(before, after, done)))
 
         return call
 
