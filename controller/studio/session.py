@@ -351,9 +351,9 @@ def _whole(content: ReplayContent | Prepared) -> ReplayContent:
 
 
 def _bar(bar: Bar) -> dict[str, object]:
-    """A bar as the page needs it, with the arguments that could be added."""
+    """A bar as the page needs it, with the arguments that could be added by a name."""
     given = {slot.of for slot in bar.slots}
-    more = [name for name in parameters(bar.name) if name not in given]
+    more = [name for name in parameters(bar.name) if name not in {*given, "others"}]
     slots = [{name: getattr(slot, name) for name in _SLOT} for slot in bar.slots]
     return {**{name: getattr(bar, name) for name in _BAR}, "slots": slots, "more": more}
 

@@ -117,6 +117,9 @@ def _bars(
         call = mark.call
         is_here = call.file == path
         parts = tuple(part if isinstance(part, str) else part.name for part in mark.parts)
+        values = dict(_values(call.arguments))
+        if is_here and "others" in call.arguments:  # which have no name but what is written
+            values["others"] = source.text(call.site).partition("(")[2][:-1]
         yield Bar(
             call.name,
             call.site if is_here else (0, 0),
@@ -126,7 +129,7 @@ def _bars(
             parts,
             _broken(content, mark.start, mark.end, parts),
             tuple(source.slots(call.site, Run(call.number, call.callers))) if is_here else (),
-            dict(_values(call.arguments)),
+            values,
             call.callers,
         )
 

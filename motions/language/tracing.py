@@ -152,7 +152,9 @@ def _mark(before: Timeline, after: Timeline, call: Call) -> CallMark:
     known = set[int]() if is_longer else {id(key) for key in before.keys}
     new = [key for key in tail if id(key) not in known and not isinstance(key, CallMark)]
     is_whole = not is_longer and _count(after) - len(new) < _count(before)
-    if is_whole or (call.name in _JOINING and new):
+    if call.name == "then" and new:
+        parts = {TIME}
+    elif is_whole or (call.name in _JOINING and new):
         new, parts = [key for key in after.keys if not isinstance(key, CallMark)], {TIME}
     else:
         parts = {part for key in new for part in _parts(key)} or {TRUNK if new else TIME}
@@ -168,7 +170,7 @@ def _count(line: Timeline) -> int:
     return sum(not isinstance(key, CallMark) for key in line.keys)
 
 
-_JOINING = frozenset({"then", "together", "repeat", "loop"})
+_JOINING = frozenset({"together", "repeat", "loop"})
 
 
 def _parts(key: Key) -> tuple[Leg | str, ...]:

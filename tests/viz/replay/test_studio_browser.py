@@ -138,7 +138,17 @@ def test_a_move_is_inserted_and_one_that_is_refused_is_told(tab: Tab, file: Path
     assert tab.evaluate("studio.selected") == 3, "still that one"
 
 
+def test_a_bar_that_is_chosen_while_another_is_saved_stays_chosen(tab: Tab, file: Path) -> None:
+    order = "{ op: 'set', site: studio.bar().site, number: 0, name: 'over', value: 0.9 }"
+    tab.evaluate(f"(() => {{ studio.select(0); studio.send({order}, true); studio.select(2); }})()")
+    tab.wait_for(f"{SAID} === 'saved'")
+    tab.wait_for(SETTLED)
+    assert "(10.0), over=0.9" in file.read_text(encoding="utf-8")
+    assert tab.evaluate("studio.selected") == 2
+
+
 def test_what_is_inserted_next_goes_behind_both_calls_of_a_pair(tab: Tab, file: Path) -> None:
+    tab.page.locator("[data-bar='3']").click()
     for title in ("Lift and put down", "Pause"):
         tab.page.get_by_label("Insert a move").select_option(title)
         tab.wait_for(SETTLED)

@@ -168,6 +168,9 @@ def test_a_motion_of_the_library_is_chosen_by_its_picture(tab: Tab, file: Path) 
     assert "from motions import Timeline, deg, motion, find_motion\n" in text
     assert '\n        .then(find_motion("nod")())\n    )\n' in text
     assert tab.evaluate("studio.bar().name") == "then", "what was made is chosen"
+    assert tab.evaluate("described(studio.bar())[0]") == "Nod", "it bears the motion's name"
+    assert tab.evaluate("studio.bar().span[0]") == pytest.approx(2.1), "it begins behind the rest"
+    assert "others" not in tab.evaluate("studio.bar().more"), "it cannot be given by a name"
     assert tab.evaluate("replay.data.duration") == pytest.approx(2.1 + find_motion("nod")().end)
     do(tab, "studio.select(0); studio.playBehind('nod')")
     assert "home" in tab.text("#studio-say"), "the robot is not at home there"

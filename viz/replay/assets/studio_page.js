@@ -316,6 +316,7 @@ class Studio {
     this.tools.offer([]);
     this.tell(isCommitted ? "saving…" : "checking…");
     const asked = performance.now();
+    const chosen = String([...this.chosen]);
     const answer = await this.post("edit", { ...order, base: this.editor.base, commit: isCommitted });
     if (answer.data) {
       this.player.use(answer.data);
@@ -324,7 +325,8 @@ class Studio {
     }
     this.tell(answer.error ?? (isCommitted ? "saved" : "not saved yet"), Boolean(answer.error));
     if (answer.error) this.inspector.forget();
-    if (answer.error || isCommitted) await this.reload(answer.site);
+    const isSame = String([...this.chosen]) === chosen; // else another bar has been chosen meanwhile
+    if (answer.error || isCommitted) await this.reload(isSame ? answer.site : null);
     if (answer.site && !order.op.startsWith("set") && this.selected !== null && this.chosen.size === 1) this.select(this.selected);
     this.tracks.refocus(this.selected);
     this.isBusy = false;

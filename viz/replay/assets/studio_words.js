@@ -63,6 +63,10 @@ function described(bar) {
     const which = readable(String(values.name ?? values.stance ?? ""));
     return [`${name} ${which.toLowerCase()}`, which || name];
   }
+  if (bar.name === "then" && values.others) {
+    const which = readable(/^\s*(?:find_motion\(["'])?([\w ]+)/.exec(String(values.others))?.[1] ?? name);
+    return [which, which];
+  }
   if (bar.name === "hold") return [`Pause ${amount("seconds", values.seconds)}`.trim(), "Pause"];
   if (bar.name === "bpm") return [`${values.beats_per_minute ?? ""} beats/min`, "Tempo"];
   if (bar.name === "repeat" || bar.name === "hop") return [`${name} ×${values.times ?? "?"}`, name];
