@@ -282,6 +282,18 @@ def test_feet_of_a_fast_turn_stay_on_their_circle_all_the_way() -> None:
         assert np.linalg.norm(feet, axis=1).max() < radius + OUTSIDE
 
 
+def test_commands_that_were_late_are_taken_for_late_while_they_seem_to_be_prompt() -> None:
+    start, told = resting(), []
+    planner = LocomotionPlanner(MODEL, TROT, CONFIG)
+    planner.start(start)
+    for tick in range(round(60.0 / 0.5)):
+        delay = 0.012 if tick == 0 else 0.004
+        planner.update(at(start, 0.5 * tick), ZERO_COMMAND, delay=delay)
+        told.append(planner.is_late)
+    assert all(told[: round(15.0 / 0.5)])
+    assert not told[-1], "for ever"
+
+
 def test_a_foothold_stays_within_reach_of_the_hip() -> None:
     start, v = resting(), np.array([4.0, 3.0, 0.0])
     reference = landing(moving(start, v), ZERO_COMMAND)
