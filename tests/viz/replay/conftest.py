@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -11,6 +12,7 @@ import pytest
 import viz
 from go2_wbc.recording import Recording
 from tests.viz.replay.browsing import Tab, chromium
+from tests.viz.replay.studio_tab import studio_tab, undo_all
 from viz.content import ReplayContent
 
 if TYPE_CHECKING:
@@ -37,3 +39,19 @@ def open_page(chromium_browser: Browser, tmp_path_factory: pytest.TempPathFactor
             yield tab
 
     return opened
+
+
+@pytest.fixture(scope="module")
+def studio(file: Path, chromium_browser: Browser) -> Iterator[Tab]:
+    """The studio's page with the ``file`` of the module, by one who needs no tour."""
+    with studio_tab(file, chromium_browser) as tab:
+        tab.page.get_by_role("button", name="Skip the tour").click()
+        yield tab
+
+
+@pytest.fixture
+def tab(studio: Tab, file: Path) -> Iterator[Tab]:
+    """The studio's page, its file as it was at first; undone, it is so again."""
+    first = file.read_text(encoding="utf-8")
+    yield studio
+    undo_all(studio, file, first)

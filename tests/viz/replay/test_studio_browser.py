@@ -10,7 +10,7 @@ import pytest
 
 from tests.controller.studio.test_session import GREET
 from tests.viz.replay.browsing import Tab
-from tests.viz.replay.studio_tab import SETTLED, studio_tab, undo_all
+from tests.viz.replay.studio_tab import SETTLED, studio_tab
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -33,13 +33,6 @@ def studio(file: Path, chromium_browser: Browser) -> Iterator[Tab]:
             tab.page.get_by_role("button", name="Next").click()
         tab.page.get_by_role("button", name="Done").click()
         yield tab
-
-
-@pytest.fixture
-def tab(studio: Tab, file: Path) -> Iterator[Tab]:
-    """The page, its file as it was at first; undone, it is so again."""
-    yield studio
-    undo_all(studio, file, GREET)
 
 
 def _bar(tab: Tab, index: int) -> dict[str, Any]:

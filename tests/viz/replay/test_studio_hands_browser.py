@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,10 +11,10 @@ import pytest
 
 from motions.music import click_track
 from tests.viz.replay.browsing import Tab
-from tests.viz.replay.studio_tab import SETTLED, studio_tab, undo_all
+from tests.viz.replay.studio_tab import SETTLED
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+    pass
 
 pytestmark = pytest.mark.slow
 ON_BEAT = 0.01  #: s; a beat of a click track is found as near as that
@@ -47,20 +46,6 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path.write_text(DANCE, encoding="utf-8")
     click_track(100.0, 12.0).save(path.with_name("clicks.wav"))
     return path
-
-
-@pytest.fixture(scope="module")
-def studio(file: Path, chromium_browser: Browser) -> Iterator[Tab]:
-    with studio_tab(file, chromium_browser) as tab:
-        tab.page.get_by_role("button", name="Skip the tour").click()
-        yield tab
-
-
-@pytest.fixture
-def tab(studio: Tab, file: Path) -> Iterator[Tab]:
-    """The page, its file as it was at first; undone, it is so again."""
-    yield studio
-    undo_all(studio, file, DANCE)
 
 
 def _choose(tab: Tab, name: str) -> None:

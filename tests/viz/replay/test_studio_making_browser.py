@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,10 +12,10 @@ from PIL import Image
 
 from motions import find_motion, motion_names
 from tests.viz.replay.browsing import Tab
-from tests.viz.replay.studio_tab import SETTLED, do, studio_tab, undo_all
+from tests.viz.replay.studio_tab import SETTLED, do
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+    pass
 
 pytestmark = pytest.mark.slow
 SAID = "document.getElementById('studio-say').textContent"
@@ -43,20 +42,6 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("studio") / "acts.py"
     path.write_text(ACTS, encoding="utf-8")
     return path
-
-
-@pytest.fixture(scope="module")
-def studio(file: Path, chromium_browser: Browser) -> Iterator[Tab]:
-    with studio_tab(file, chromium_browser) as tab:
-        tab.page.get_by_role("button", name="Skip the tour").click()
-        yield tab
-
-
-@pytest.fixture
-def tab(studio: Tab, file: Path) -> Iterator[Tab]:
-    """The page, its file as it was at first; undone, it is so again."""
-    yield studio
-    undo_all(studio, file, ACTS)
 
 
 def test_a_move_is_split_at_the_playhead_by_key_and_button(tab: Tab, file: Path) -> None:
