@@ -78,6 +78,7 @@ def edited(source: Source, order: Mapping[str, object], motion: str = "") -> Sou
             - "pace": ``.scale_time(value)`` is added to the motion;
             - "library": the motion of the library with this ``name`` is played behind the call, or
               as the first one where no ``site`` is given;
+            - "last": the call of ``title`` is put at the end of the motion;
             - "begin": the call of ``title`` is put behind a ``Timeline()`` that has none.
 
             ``callers``: of the bar, if it is not the only one that runs in a helper.
@@ -89,6 +90,8 @@ def edited(source: Source, order: Mapping[str, object], motion: str = "") -> Sou
     op, site = order.get("op"), order.get("site")
     if op == "pace":
         return source.append(motion, f".scale_time({written(_number(order))})")
+    if op == "last":
+        return source.append(motion, _template(order).code(source))
     if op == "begin":
         return begun(source, motion, _template(order).code(source))
     if op == "library":
@@ -98,7 +101,9 @@ def edited(source: Source, order: Mapping[str, object], motion: str = "") -> Sou
         return parametrised(source, motion, site_of(site), name, run_of(order))
     if not isinstance(op, str) or op not in _EDITS:
         raise StudioError(
-            unknown_name("edit", str(op), [*_EDITS, "parameter", "pace", "library", "begin"])
+            unknown_name(
+                "edit", str(op), [*_EDITS, "parameter", "pace", "library", "last", "begin"]
+            )
         )
     return _EDITS[op](source, site_of(site), order)
 

@@ -46,6 +46,16 @@ class Order:
     values: Mapping[str, Value]  #: chosen parameters
     task: Task = Task.CHECK  #: what is done with it
     cut: Cut | None = None  #: where it is split
+    longest: float = 0.0  #: processor time [s] that one jump may be solved for; 0: the solver's own
+
+
+@dataclass(frozen=True, slots=True)
+class Doing:
+    """How far the process has got, told while it works."""
+
+    what: str  #: "loading", "solving" or "playing"
+    done: float = 0.0  #: time [s] that was solved for, or of the motion that was played
+    whole: float = 0.0  #: of so many seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,3 +89,5 @@ class Answer:
     """Calls that make it possible, to be appended to the motion, each with its meaning."""
     split: tuple[bytes, int] | None = None
     """The text with one call made two, and the byte behind them."""
+    is_solved: bool = True
+    """Whether all that jumps was solved; without content it took longer than it may."""

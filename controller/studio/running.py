@@ -9,9 +9,11 @@ from __future__ import annotations
 import multiprocessing
 import os
 import threading
+import time
+from collections.abc import Callable
 from typing import cast, final
 
-from controller.studio.orders import Answer, Order
+from controller.studio.orders import Answer, Doing, Order
 from controller.studio.working import serve
 from controller.sweeps.engine import ONE_THREAD
 from go2_wbc.errors import StudioError
@@ -23,16 +25,22 @@ LONGEST_WORK = 120.0  #: Time [s] that solving, checking or playing may take
 
 @final
 class Runner:
-    """Has texts run, one after the other."""
+    """Has texts run, one after the other.
+
+    Attributes:
+        tell: hears how far an order is, and ``None`` when it has ended.
+    """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
+        self.tell: Callable[[Doing | None], None] = lambda _: None
         self._start()
 
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._pipe, there = context.Pipe()
-        self._process = context.Process(target=serve, args=(there,), daemon=True)
+        self._stop = context.Event()
+        self._process = context.Process(target=serve, args=(there, self._stop), daemon=True)
         before = os.environ.copy()
         os.environ.update(ONE_THREAD)  # more would wait for each other, busily
         self._process.start()
@@ -55,9 +63,11 @@ class Runner:
                 process: the next one runs in another.
         """
         with self._lock:
+            self._stop.clear()
             try:
                 self._pipe.send(order)
                 if not self._is_warm:  # importing the robot takes its time
+                    self.tell(Doing("loading"))
                     self._received(LONGEST_WORK, "could not be loaded")
                     self._is_warm = True
                 self._received(LONGEST_RUN, f"ran for longer than {LONGEST_RUN:g} s")
@@ -66,15 +76,24 @@ class Runner:
                 self._restart()
                 name = order.path.name
                 raise StudioError(f"{name} has ended the process that runs it") from error
+            finally:
+                self.tell(None)
         if isinstance(answer, StudioError):
             raise answer
         return cast("Answer", answer)
 
+    def stop(self) -> None:
+        """Have what is solved or played end: ``run`` then raises StudioError."""
+        self._stop.set()
+
     def _received(self, patience: float, otherwise: str) -> object:
-        if not self._pipe.poll(patience):
-            self._restart()
-            raise StudioError(f"the file {otherwise}; it was stopped")
-        return self._pipe.recv()
+        latest = time.monotonic() + patience
+        while self._pipe.poll(max(latest - time.monotonic(), 0.0)):
+            if not isinstance(told := self._pipe.recv(), Doing):
+                return told
+            self.tell(told)
+        self._restart()
+        raise StudioError(f"the file {otherwise}; it was stopped")
 
     def _restart(self) -> None:
         self.close()

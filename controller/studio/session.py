@@ -6,14 +6,15 @@ import hashlib
 import secrets
 import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import final
 
 import viz
 from controller.studio.edits import PALETTE, edited, run_of, site_of
 from controller.studio.library import library
-from controller.studio.orders import Answer, Bar, Cut, Order, Task
+from controller.studio.orders import Answer, Bar, Cut, Doing, Order, Task
 from controller.studio.project import Project
 from controller.studio.rewriting import offers
 from controller.studio.running import Runner
@@ -33,6 +34,11 @@ from viz.replay.page_data import Prepared
 from viz.replay.preview_server import PreviewServer
 
 HISTORY = ("undo", "redo")
+LONGEST_SOLVE, LONGEST_TRY = 6.0, 3.0
+"""Processor time [s] that a jump which the page asks for is solved for, and one of those that are
+tried for the most that can be done: own choice. Of 17 jumps that the robot can do the slowest took
+2.3 s; none that took longer than 5 s passed the check."""
+FINEST = 0.01, 1.0  #: How near [m, deg] to the most that can be done it is looked for
 EXPORTS = ("html", "webp")  #: An offline page, and a film
 WORDS: Mapping[str, Sequence[str]] = {
     "leg": [leg.name for leg in LEGS],
@@ -69,7 +75,9 @@ class Studio:
         """
         self._project, self._values = Project(path), dict[str, Value]()
         self._lock, self.motion = threading.RLock(), motion
+        self._doing = dict[str, Doing]()
         self._runner, self._player = Runner(), Runner()
+        self._is_solved = True  # all that jumps in what is saved
         self._changes: tuple[str, ...] = ()
         self._copied: tuple[str, ...] = ()
         self._motions: tuple[str, ...] = ()
@@ -91,6 +99,8 @@ class Studio:
                     "/library": lambda _: library(),
                     "/music": self.music,
                     "/play": self.play,
+                    "/cancel": self.cancel,
+                    "/highest": self.highest,
                     "/mend": self.mend,
                     "/export": self.export,
                 },
@@ -98,6 +108,8 @@ class Studio:
         except BaseException:
             self._end()
             raise
+        self._runner.tell = partial(self._told_of, "edit")
+        self._player.tell = partial(self._told_of, "play")
         self.url = f"{self._server.url}?token={token}"
 
     def warm(self) -> None:
@@ -143,10 +155,15 @@ class Studio:
         else:
             source, chosen = self._edited(order), self.motion
         data, site = source.data, dict[str, object](site=source.site)
-        shown = self._run(data, chosen=chosen)  # what is no motion is not saved
+        longest = LONGEST_SOLVE if self._is_solved else 0.0
+        shown = self._run(data, chosen=chosen, longest=longest)  # what is no motion is not saved
+        if self._is_solved and not shown.is_solved:
+            after = f" in {longest:g} s of work" if shown.content is None else ""
+            told = f"no way to do it was found{after}; the motion is as it was."
+            return {"error": told, "unsolved": True}
         if order.get("commit") is True:
             self._project.save(data)
-            self._bars, self.motion = shown.bars, shown.title
+            self._bars, self._is_solved, self.motion = shown.bars, shown.is_solved, shown.title
             self._server.publish(self._content(shown), shown.title)
             return site
         return self._server.answer({}, self._content(shown), shown.title, order.get("has"))
@@ -222,6 +239,44 @@ class Studio:
         told = {"told": shown.told}
         return self._server.answer(told, self._content(shown), shown.title, order.get("has"))
 
+    def cancel(self, _: Mapping[str, object]) -> dict[str, object]:
+        """End what is solved or played; its request then is answered with an error."""
+        self._runner.stop()
+        self._player.stop()
+        return {}
+
+    def highest(self, order: Mapping[str, object]) -> dict[str, object]:
+        """The most of an argument that can be done, short of what an ``order`` "set" asks for.
+
+        It is looked for between that and what is saved, in the process that plays: edits go on.
+        """
+        source, bars = Source(self._project.saved), self._bars
+        try:
+            full = self._with_callers(order)
+            site, run, asked = site_of(order.get("site")), run_of(full), order.get("value")
+            found = [one for one in source.slots(site, run) if one.name == order.get("name")]
+            low = found[0].value if found else 0.0
+            if not isinstance(asked, int | float) or not isinstance(low, int | float):
+                raise StudioError("only of a number there is a most")
+            index = [(bar.site, bar.number) for bar in bars].index((site, run.number))
+            step, best, high = FINEST[bool(found) and found[0].is_angle], None, float(asked)
+            while abs(high - low) > 1.5 * step:
+                middle = round(step * round(0.5 * (low + high) / step), 2)
+                after = edited(source, {**full, "op": "set", "value": middle}, self.motion or "")
+                if self._can_do(after.data, index):
+                    best = low = middle
+                else:
+                    high = middle
+        except (StudioError, ValueError) as error:
+            return {"error": str(error)}
+        return {"highest": best}
+
+    def _can_do(self, data: bytes, index: int) -> bool:
+        """Whether the robot can do a call of a text, in as long as is tried."""
+        order = Order(self._project.path, data, self.motion, self._values, longest=LONGEST_TRY)
+        shown = self._player.run(order)
+        return shown.is_solved and index < len(shown.bars) and not shown.bars[index].broken
+
     def mend(self, _: Mapping[str, object]) -> dict[str, object]:
         """What would make the motion possible, as it is saved; taken by ``op`` "change"."""
         try:
@@ -255,7 +310,8 @@ class Studio:
                 viz.export_animation(content, path, speed=1.0, fps=12.5)
         except Go2WbcError as error:
             return {"error": str(error)}
-        return {"told": f"wrote {path.name}"}
+        self._server.files[path.name] = path
+        return {"told": f"wrote {path.name}", "file": path.name}
 
     def look(self) -> bool:
         """Show what somebody else has saved, once it rests; whether anything is new."""
@@ -304,14 +360,23 @@ class Studio:
         task: Task = Task.CHECK,
         cut: Cut | None = None,
         chosen: str | None = None,
+        longest: float = 0.0,
     ) -> Answer:
         motion = chosen or self.motion
-        order = Order(self._project.path, data, motion, self._values, task, cut)
+        order = Order(self._project.path, data, motion, self._values, task, cut, longest)
         is_quick = task in (Task.CHECK, Task.EXPORT, Task.SPLIT)
         answer = (self._runner if is_quick else self._player).run(order)
         if data == self._project.saved and answer.bars:
-            self._bars = answer.bars
+            self._bars, self._is_solved = answer.bars, answer.is_solved
         return answer
+
+    def _told_of(self, which: str, doing: Doing | None) -> None:
+        """Pages show how far the process is that edits, or the one that plays."""
+        if doing is None:
+            self._doing.pop(which, None)
+        else:
+            self._doing[which] = doing
+        self._server.publish_doing({name: asdict(one) for name, one in [*self._doing.items()]})
 
     def _with_callers(self, order: Mapping[str, object]) -> Mapping[str, object]:
         """The order with the calls of helpers that the bar which it means runs in."""

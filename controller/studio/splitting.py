@@ -61,18 +61,20 @@ def split(source: Source, path: str, marks: Sequence[CallMark], cut: Cut) -> Sou
     length = call.arguments.get(how_long)
     if call.name != "hold" and call.name not in {*TRUNK, *FEET, *WAYS}:
         why = WHY_NOT.get(call.name, "it is no single move")
-        raise StudioError(f"{call.name}() cannot be split: {why}")
+        raise StudioError(f"it cannot be split: {why}")
     if call.name != "hold" and len(runs) > 1:
-        raise StudioError(f"{call.name}() runs {len(runs)} times: write its loop out first")
+        raise StudioError(f"it runs {len(runs)} times in a loop: write the loop out first")
     if not isinstance(length, int | float):
-        raise StudioError(f"{call.name}() takes as long as its gait needs: give it a time first")
+        raise StudioError("it takes as long as its steps need: add the argument Takes first")
     start = mark.start if call.name in WAYS else mark.move  # a shift before it is not of its time
+    is_shift = mark.start < cut.time < start
+    shift = "; while the trunk shifts (hatched) there is nothing to split" if is_shift else ""
     share = (cut.time - start) / max(mark.end - start, LEAST)
     first = round(share * length, 2)
     if not LEAST <= first <= length - LEAST:
         raise StudioError(
-            f"the playhead is at {cut.time:.2f} s: to split {call.name}(), put it between "
-            f"{start:.2f} and {mark.end:.2f} s"
+            f"the playhead is at {cut.time:.2f} s: to split it, put the playhead between "
+            f"{start:.2f} and {mark.end:.2f} s{shift}"
         )
     share = first / length
     shared = {
@@ -89,7 +91,7 @@ def _half(call: Call, share: float) -> _Half:
     if call.name == "hold" or call.name in WAYS or before is None:
         ways = [name for name in WAYS.get(call.name, ()) if call.arguments.get(name)]
         if len(ways) > 1 and "turn" in ways:
-            raise StudioError("walk() cannot be split while it turns on its way")
+            raise StudioError("a walk that turns on its way cannot be split")
         return _Half(call.name, {})
     given: dict[str, Any] = call.arguments
     after: Timeline = getattr(before, call.name)(**given)
@@ -97,7 +99,7 @@ def _half(call: Call, share: float) -> _Half:
     if call.name in FEET:
         return _half_of_foot(call, before, after, done)
     if before.raised != after.raised:
-        raise StudioError("home() cannot be split while a foot is raised: put it down first")
+        raise StudioError("All home cannot be split while a foot is raised: put it down first")
     ways = {name: (before.body_value(name), after.body_value(name)) for name in BODY_CHANNELS}
     numbers = {
         name: start + done * (goal - start)
@@ -105,7 +107,7 @@ def _half(call: Call, share: float) -> _Half:
         if start != goal or (call.name == "body" and name in given)
     }
     if not numbers:
-        raise StudioError(f"{call.name}() does not move the trunk: there is nothing to split")
+        raise StudioError("it does not move the trunk: there is nothing to split")
     return _Half("body", numbers)
 
 
@@ -113,8 +115,8 @@ def _half_of_foot(call: Call, before: Timeline, after: Timeline, done: float) ->
     given: dict[str, Any] = call.arguments
     start, goal = (_target(line, foot(given["leg"])) for line in (before, after))
     if start.frame is not goal.frame:
-        way = f"the foot goes from the frame {start.frame.value!r} to {goal.frame.value!r}"
-        raise StudioError(f"{call.name}() cannot be split: {way}")
+        way = f"the {start.frame.value} before it, and with the {goal.frame.value} then"
+        raise StudioError(f"it cannot be split: the foot goes with {way}")
     values = [a + done * (b - a) for a, b in zip(start.values, goal.values, strict=True)]
     if call.name == "joint":
         return _Half("joint", {"angle": values[JOINTS.index(given["joint"])]})

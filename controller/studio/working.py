@@ -2,32 +2,107 @@
 
 from __future__ import annotations
 
+import math
+import threading
+import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from enum import Enum
 from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING
+from multiprocessing.synchronize import Event
+from typing import TYPE_CHECKING, final
 
 from controller.studio.literals import Run
-from controller.studio.orders import Answer, Bar, Order, Task
+from controller.studio.orders import Answer, Bar, Doing, Order, Task
+from controller.studio.plain import in_words, is_unsolved, plainly
 from controller.studio.source import Source
 from controller.studio.splitting import split
 from go2_wbc.errors import Go2WbcError, StudioError
 from go2_wbc.legs import LEGS, Leg
 
 if TYPE_CHECKING:
+    from controller.go2_controller import GO2Controller
     from controller.studio.making import Maker
     from motions import CheckedMotion, FeasibilityChecker
     from motions.language.tracing import CallMark
     from viz.content import ReplayContent
 
 
-def serve(pipe: Connection) -> None:
+STOPPED = "stopped: the motion is as it was"
+PERIOD = 0.1  #: s, between two words of how far it is
+
+
+class _TooLong(Exception):
+    """A jump was solved for as long as it may."""
+
+
+@final
+class Teller:
+    """Tells how far the work is, and ends it where that is asked for."""
+
+    def __init__(self, pipe: Connection, stop: Event) -> None:
+        self._pipe, self._stop = pipe, stop
+        self._longest, self._since, self._told = 0.0, 0.0, math.inf  # nothing before an order
+
+    def begin(self, longest: float) -> None:
+        """Take up an order, in which each jump may be solved for ``longest`` [s]."""
+        self._longest, self._told = longest, 0.0
+
+    @property
+    def _is_stopped(self) -> bool:
+        return self._told < math.inf and self._stop.is_set()
+
+    def __call__(self, iterations: int, _cost: float) -> None:
+        """As the solver's progress, which counts its iterations anew for each jump."""
+        from motions.dynamics.solver import BUDGET
+
+        now = time.thread_time()
+        if iterations <= 1:
+            self._since = now
+        self.tell(Doing("solving", now - self._since, self._longest or BUDGET))
+        if self._is_stopped:
+            raise StudioError(STOPPED)
+        if 0.0 < self._longest < now - self._since:
+            raise _TooLong
+
+    def tell(self, doing: Doing) -> None:
+        """At once, and then every ``PERIOD``."""
+        if time.monotonic() > self._told + PERIOD:
+            self._told = time.monotonic()
+            self._pipe.send(doing)
+
+    @contextmanager
+    def watching(self, go2: GO2Controller, duration: float) -> Iterator[None]:
+        """Meanwhile, tell how much of a motion the robot has played."""
+        is_over = threading.Event()
+
+        def watch() -> None:
+            played = 0.0  # it is none again where it ends
+            while not is_over.is_set():
+                played = max(played, go2.progress * duration)
+                self.tell(Doing("playing", played, duration))
+                if self._is_stopped:
+                    return go2.cancel()
+                is_over.wait(PERIOD)
+
+        watcher = threading.Thread(target=watch)
+        watcher.start()
+        try:
+            yield
+        finally:
+            is_over.set()
+            watcher.join()
+        if self._is_stopped:
+            raise StudioError(STOPPED)
+
+
+def serve(pipe: Connection, stop: Event) -> None:
     """Answer orders: a word once the robot is loaded, one when the file has run, and the answer.
 
     A first order that is ``None`` has it play something before that word: then all of it is loaded.
+    What was begun ends where ``stop`` is set.
     """
     with suppress(EOFError, KeyboardInterrupt):
         order: Order | None = pipe.recv()
@@ -36,24 +111,28 @@ def serve(pipe: Connection) -> None:
         from motions.memory import Memory
         from viz.replay import page_data  # noqa: F401 - takes its time, which no file has to answer for
 
-        checker = FeasibilityChecker(memory=Memory())  # most of a motion is as it was
+        teller = Teller(pipe, stop)
+        checker = FeasibilityChecker(memory=Memory(), progress=teller)  # most of a motion stays
         maker = Maker()
         if order is None:
-            _played(checker.evaluate(Timeline().body(z=-0.01, over=0.2)), checker)
+            _played(checker.evaluate(Timeline().body(z=-0.01, over=0.2)), checker, teller)
         pipe.send("loaded")
         while True:
             if order is not None:
-                pipe.send(_answer(order, checker, maker, pipe))
+                teller.begin(order.longest)
+                pipe.send(_answer(order, checker, maker, pipe, teller))
             order = pipe.recv()
 
 
 def _answer(
-    order: Order, checker: FeasibilityChecker, maker: Maker, pipe: Connection
+    order: Order, checker: FeasibilityChecker, maker: Maker, pipe: Connection, teller: Teller
 ) -> Answer | StudioError:
     from controller.report_view import planned, slider
     from motions import suggest
 
     has_run = False
+    if order.task is Task.PLAY:
+        teller.tell(Doing("playing"))  # the check comes first
     try:
         made = maker.make(order)
         motion, values, line = made.motion, made.values, made.line
@@ -69,7 +148,7 @@ def _answer(
             return Answer(motion.name, split=(after.data, end))
         checked = checker.evaluate(line)
         if order.task is Task.PLAY:
-            content, told = _played(checked, checker)
+            content, told = _played(checked, checker, teller)
         else:
             content, told = planned(checked), ""
     except (Go2WbcError, SystemExit) as error:
@@ -77,16 +156,21 @@ def _answer(
             pipe.send("failed")
         is_ours = isinstance(error, Go2WbcError)
         return StudioError(str(error) if is_ours else "the file ends the program")
+    except _TooLong:
+        return Answer(order.chosen or "", is_solved=False)
     from viz.replay.page_data import prepared
 
     sliders = tuple(slider(item, values.get(item.name, item.default)) for item in motion.parameters)
+    content = plainly(replace(content, sliders=sliders))
     bars = tuple(_bars(Source(order.data), str(order.path), made.marks, content))
-    content = replace(content, sliders=sliders)
     shown = content if order.task is Task.EXPORT else prepared(content)
-    return Answer(motion.name, shown, bars, made.names, told, made.notes)
+    is_solved = not is_unsolved(content)
+    return Answer(motion.name, shown, bars, made.names, told, made.notes, is_solved=is_solved)
 
 
-def _played(checked: CheckedMotion, checker: FeasibilityChecker) -> tuple[ReplayContent, str]:
+def _played(
+    checked: CheckedMotion, checker: FeasibilityChecker, teller: Teller
+) -> tuple[ReplayContent, str]:
     """The motion in MuJoCo, in the world that it was checked for, and how that went."""
     from controller.go2_controller import GO2Controller
     from controller.motion_measurement import measure_motion
@@ -102,7 +186,8 @@ def _played(checked: CheckedMotion, checker: FeasibilityChecker) -> tuple[Replay
         is_ready = go2.sit() if checked.plan.entry is Posture.SIT else go2.stand()
         if not is_ready:
             raise StudioError(f"the robot did not get ready: {go2.last_outcome.reason}")
-        result = measure_motion(go2, truth, checked.plan, checker.model)
+        with teller.watching(go2, checked.plan.duration):
+            result = measure_motion(go2, truth, checked.plan, checker.model)
         content = performed(checked, go2.recording(), checker.model)
     why = result.fall or result.reason
     share = f"{100 * result.torque:.0f} % of the torque, {100 * result.speed:.0f} % of the speed"
@@ -154,5 +239,5 @@ def _broken(content: ReplayContent, start: float, end: float, parts: Sequence[st
             not legs or bool(legs & set(parts)) or not set(parts) & {leg.name for leg in LEGS}
         )
         if item.is_broken and concerns and any(a < end and start < b for a, b in item.spans):
-            return f"{item.limit}, {item.subject}: {item.text}"
+            return in_words(item)
     return ""

@@ -17,8 +17,9 @@ from collections.abc import Callable, Mapping
 from datetime import datetime
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 from typing import Any, final
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, unquote, urlsplit
 
 from go2_wbc.errors import ConfigError
 from viz.content import ReplayContent, checked_content
@@ -56,6 +57,7 @@ class PreviewServer(ThreadingHTTPServer):
     Attributes:
         url: address of the page.
         on_values: who is told what was chosen.
+        files: that pages may open, by their names.
     """
 
     daemon_threads = True
@@ -92,8 +94,8 @@ class PreviewServer(ThreadingHTTPServer):
         self.token, self.actions = token, actions or {}
         self._scene = scene_text(content.recording)
         self._changed = threading.Condition()
-        self._sent = dict[str, Packed]()
-        self._is_open = True
+        self.files, self._sent = dict[str, Path](), dict[str, Packed]()
+        self._is_open, self._doing = True, dict[str, object]()
         self._pack(content)
         try:
             super().__init__((LOOPBACK, port), _Handler)
@@ -148,6 +150,13 @@ class PreviewServer(ThreadingHTTPServer):
             self._error = message
             self._changed.notify_all()
 
+    def publish_doing(self, doing: Mapping[str, object]) -> None:
+        """Say what is being done meanwhile, and how far it is; nothing, once it is done."""
+        with self._changed:
+            if doing != self._doing:
+                self._doing = dict(doing)
+                self._changed.notify_all()
+
     def close(self) -> None:
         """End; open pages say so."""
         with self._changed:
@@ -170,7 +179,7 @@ class PreviewServer(ThreadingHTTPServer):
         """Wait for another state than ``seen``; "" if there is none for long.
 
         Returns:
-            Version, error and its title as JSON; ``None`` once the server ends.
+            Version, error, its title, what is being done, as JSON; ``None`` once the server ends.
         """
         with self._changed:
             self._changed.wait_for(lambda: not self._is_open or self._told() != seen, _HEARTBEAT)
@@ -185,7 +194,7 @@ class PreviewServer(ThreadingHTTPServer):
             shown += ", which the robot cannot do"
         title = f"Broken since {self._broken_since}. What is shown is {shown}."
         error = {"error": self._error, "title": title if self._error else ""}
-        return json.dumps({"version": self._version, **error})
+        return json.dumps({"version": self._version, "doing": self._doing, **error})
 
     def handle_error(self, request: object, client_address: object) -> None:
         """Log what went wrong in an answer; the page may have been closed meanwhile."""
@@ -223,6 +232,8 @@ class _Handler(BaseHTTPRequestHandler):
             self._answer_bytes(self.server.changes(query.get("has", [""])[0]))
         elif path == "/events":
             self._stream()
+        elif (file := self.server.files.get(unquote(path.removeprefix("/files/")))) is not None:
+            self._answer_file(file)
         else:
             self._refuse("not here", HTTPStatus.NOT_FOUND)
 
@@ -285,6 +296,14 @@ class _Handler(BaseHTTPRequestHandler):
             for value in values.values()
         )
         return values if is_one else None
+
+    def _answer_file(self, file: Path) -> None:
+        try:
+            content = file.read_bytes()
+        except OSError as error:
+            return self._refuse(f"{file.name}: {error.strerror}", HTTPStatus.NOT_FOUND)
+        kind = "text/html; charset=utf-8" if file.suffix == ".html" else f"image/{file.suffix[1:]}"
+        return self._answer_bytes(content, kind)
 
     def _answer(self, text: str, kind: str, status: HTTPStatus = HTTPStatus.OK) -> None:
         self._answer_bytes(text.encode(), f"{kind}; charset=utf-8", status)

@@ -222,13 +222,14 @@ def test_physics_plays_it_beside_the_plan(studio: Studio) -> None:
 
 def test_what_is_exported_lies_beside_the_file(studio: Studio, file: Path) -> None:
     page = file.with_suffix(".html")
-    assert studio.export({"kind": "html"}) == {"told": "wrote greet.html"}
+    wrote = {"told": "wrote greet.html", "file": "greet.html"}
+    assert studio.export({"kind": "html"}) == wrote
     before = page.read_text(encoding="utf-8")
     assert "class Studio" not in before
     page.write_text("mine", encoding="utf-8")
     assert studio.export({"kind": "html"}) == {"exists": "greet.html"}
     assert page.read_text(encoding="utf-8") == "mine"
-    assert studio.export({"kind": "html", "again": True}) == {"told": "wrote greet.html"}
+    assert studio.export({"kind": "html", "again": True}) == wrote
     assert page.read_text(encoding="utf-8") == before
     assert "kind" in str(studio.export({"kind": "../../evil"})["error"])
 

@@ -79,7 +79,7 @@ def test_the_studio_shows_it_judges_it_and_takes_it_back(tmp_path: Path) -> None
         assert set(studio.edit(show)) == {"site"}
         assert (studio.motion, studio._motions) == ("show", ("bow", "wave", "show"))
         assert len(studio._bars) == 6, "its five moves, and that one follows the other"
-        assert studio.export({"kind": "html"}) == {"told": "wrote show.html"}
+        assert studio.export({"kind": "html"})["file"] == "show.html"
         assert studio.edit({"op": "undo"}) == {}
         assert file.read_text(encoding="utf-8") == ACTS
         assert studio.motion == "bow", "what has gone is shown no more"

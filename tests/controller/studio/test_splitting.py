@@ -111,11 +111,11 @@ def test_only_the_call_is_touched_and_its_layout_kept() -> None:
     [
         ("Timeline().hold(1.0)", 0, 1.0, "playhead is at 1.00 s.*between 0.00 and 1.00 s"),
         ("Timeline().hold(1.0).hold(1.0)", 1, 0.5, "between 1.00 and 2.00"),
-        ("Timeline().walk(0.2)", 0, 0.5, "give it a time first"),
+        ("Timeline().walk(0.2)", 0, 0.5, "add the argument Takes first"),
         ('Timeline().step("FL", 0.04, over=0.5)', 0, 0.4, "foot is in the air"),
         ("Timeline().jump(0.1)", 0, 0.4, "no single move"),
         ('Timeline().foot("FR", z=0.05, over=0.5).home(over=0.5)', 1, 1.5, "put it down first"),
-        ('Timeline().foot("FR", z=0.05, over=0.5, frame="body")', 0, 1.1, "'ground' to 'body'"),
+        ('Timeline().foot("FR", z=0.05, over=0.5, frame="body")', 0, 1.1, "with the ground before"),
         ("Timeline().home(over=0.5)", 0, 0.2, "nothing to split"),
         ("Timeline().body(**{'z': -0.02}, over=1.0)", 0, 0.5, r"what \*\* stands for"),
     ],
@@ -132,5 +132,5 @@ def test_one_that_runs_several_times_is_left_alone() -> None:
     return line
 """.encode()
     _, marks = _made(data)
-    with pytest.raises(StudioError, match="runs 2 times: write its loop out first"):
+    with pytest.raises(StudioError, match="runs 2 times in a loop: write the loop out first"):
         split(Source(data), str(PATH), marks, Cut(marks[0].call.site, 0, 0.2))

@@ -69,7 +69,8 @@ def test_where_nothing_can_be_split_it_says_why(tab: Tab, file: Path) -> None:
     tab.page.locator("[data-bar='1']").click()  # the playhead goes to its end
     do(tab, "studio.split()")
     assert tab.text("#studio-say") == (
-        "the playhead is at 1.50 s: to split hold(), put it between 1.00 and 1.50 s"
+        "Pause 0.5 s: the playhead is at 1.50 s: "
+        "to split it, put the playhead between 1.00 and 1.50 s"
     )
     assert file.read_text(encoding="utf-8") == ACTS
 
@@ -136,7 +137,7 @@ def test_the_motions_of_a_file_are_made_a_show(tab: Tab, file: Path) -> None:
 
 
 def test_a_motion_of_the_library_is_chosen_by_its_picture(tab: Tab, file: Path) -> None:
-    do(tab, "studio.choose([]); document.activeElement.blur()")
+    do(tab, "studio.choose([]); replay.scrub(0); document.activeElement.blur()")
     tab.page.keyboard.press("a")
     search = tab.page.get_by_label("Search the library")
     cards = tab.page.locator("#library [data-motion]:visible")

@@ -6,9 +6,8 @@ const FONT = "Inter, system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-s
 const WARN = "#f59e0b", GHOST = "#7c93d6", WRITTEN = "#a8713a";
 const BEAT_ROOM = 7; // px, least distance of two lines of the beats
 const LANE = 9; // px, height of the strip that shows when limits are broken
-const LABEL_COLORS = IS_DARK.matches
-  ? ["#2c3f6e", "#5a4320", "#1f4d3a", "#5a2c43", "#41356f", "#224b56"]
-  : ["#dbe6ff", "#fde9cf", "#d5f2e3", "#fbdcea", "#e6e0fb", "#d7eff5"];
+const LEG_ALPHA = 0.3; // of a leg's colour behind words
+const LABEL_COLORS = IS_DARK.matches ? ["#2a3346", "#3a4458"] : ["#e6eaf1", "#d5dbe6"]; // neither is a leg's
 
 // A canvas with a picture that is drawn once per size, and a cursor drawn over it.
 class TimeCanvas {
@@ -145,14 +144,18 @@ class Timeline extends TimeCanvas {
   }
 
   drawLabels(paint, height) {
-    const names = [...new Set(this.data.header.labels.map((span) => span[2]))];
+    const { labels, legs, leg_colors: colors } = this.data.header;
+    const others = [...new Set(labels.map((span) => span[2]).filter((label) => !legs.includes(label.split(" ")[0])))];
     paint.textBaseline = "middle";
     paint.textAlign = "left";
-    for (const [start, end, label] of this.data.header.labels) {
+    for (const [start, end, label] of labels) {
       const [x, room] = [this.xAt(start), this.xAt(end) - this.xAt(start)];
       const width = Math.max(room - Math.min(1.5, 0.2 * room), 0.5);
-      paint.fillStyle = LABEL_COLORS[names.indexOf(label) % LABEL_COLORS.length];
+      const leg = legs.indexOf(label.split(" ")[0]); // "FL up" is of that leg
+      paint.fillStyle = leg < 0 ? LABEL_COLORS[others.indexOf(label) % LABEL_COLORS.length] : colors[leg];
+      paint.globalAlpha = leg < 0 ? 1 : LEG_ALPHA;
       roundedBox(paint, x, 0, width, height, 5);
+      paint.globalAlpha = 1;
       const text = fitted(paint, readable(label), width - 4);
       paint.fillStyle = INK;
       paint.fillText(text, x + Math.min(7, (width - paint.measureText(text).width) / 2), height / 2 + 0.5);

@@ -110,6 +110,7 @@ function listen(player) {
       sliders.use(player.data.header);
       studio?.use(player.data.header.editor);
     }
+    studio?.doing.use(state.doing);
     if (state.error) showError(state.title, state.error);
     else showError("", "");
     player.version = version;

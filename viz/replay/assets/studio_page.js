@@ -23,6 +23,7 @@ class Studio {
     this.view = new TimeView(player, () => this.drawTime());
     this.tracks = new Tracks(this, this.view);
     this.music = new Music(this);
+    this.doing = new Doing(this);
     this.tools = new Tools(this);
     this.inspector = new Inspector(this);
     this.hands = new Hands(this);
@@ -77,6 +78,7 @@ class Studio {
     const { editor } = this;
     this.view.use();
     this.tools.use(editor, this.player.data.header);
+    this.doing.explain(editor, this.player.data.annotations);
     this.tracks.use(this.player.data, editor);
     this.music.use(editor);
     this.inspector.use(this.bar(), editor, this.timeUnit, this.chosen.size);
@@ -155,6 +157,7 @@ class Studio {
   }
 
   act(op) {
+    if (this.doing.isOn && op === "undo") return this.doing.cancel();
     if (op === "undo" || op === "redo") return this.send({ op }, true);
     const bars = this.own();
     const sites = [...new Map(bars.map((bar) => [String(bar.site), bar.site])).values()];
@@ -218,6 +221,7 @@ class Studio {
     const site = this.placeOfNew();
     const isPair = title === LIFT_AND_DOWN; // the first of it is what is pulled
     this.made = { count: isPair ? 2 : 1, isLast: true, isFirst: isPair };
+    this.doing.asked = title;
     this.send(site ? { op: "insert", site, title, values } : { op: "begin", title }, true);
   }
 
@@ -227,12 +231,15 @@ class Studio {
     this.send({ op: "library", site: this.placeOfNew() ?? null, name }, true);
   }
 
-  // The call behind which something new is put: the last that is chosen, else the last of all.
+  // The call behind which something new is put: the last that is chosen, else the last that has
+  // begun where the playhead is, else, with it at the start or on its way, the last of all.
   placeOfNew() {
-    const { bars } = this.editor, chosen = this.own();
+    const chosen = this.own();
     if (chosen.length) return chosen[chosen.length - 1].site;
-    const own = bars.filter(isOwn).sort((a, b) => a.span[2] - b.span[2]);
-    return own[own.length - 1]?.site;
+    const { time, isPlaying } = this.player;
+    const own = this.editor.bars.filter(isOwn).sort((a, b) => a.span[2] - b.span[2]);
+    const begun = isPlaying ? [] : own.filter(({ span }) => span[0] < time - 1e-6);
+    return (begun.pop() ?? own.pop())?.site;
   }
 
   // What else can be done with a call, such as writing out its loop: orders with their titles.
@@ -270,6 +277,7 @@ class Studio {
    */
   setMany(bar, values, isCommitted) {
     this.inspector.follow(values);
+    this.doing.asked = this.doing.asking(bar, values);
     if (!isCommitted && bar.parts.includes("robot")) return;
     const { site, number } = bar;
     const entries = Object.entries(values);
@@ -323,7 +331,7 @@ class Studio {
       this.redrawDraft(this.player.data.header.editor);
       this.took = performance.now() - asked; // ms, for scripts that measure
     }
-    this.tell(answer.error ?? (isCommitted ? "saved" : "not saved yet"), Boolean(answer.error));
+    this.tell(this.doing.worded(order, answer.error) ?? (isCommitted ? "saved" : "not saved yet"), Boolean(answer.error));
     if (answer.error) this.inspector.forget();
     const isSame = String([...this.chosen]) === chosen; // else another bar has been chosen meanwhile
     if (answer.error || isCommitted) await this.reload(isSame ? answer.site : null);
@@ -334,7 +342,7 @@ class Studio {
       const next = this.waiting;
       this.waiting = null;
       this.send(next.order, next.isCommitted);
-    }
+    } else if (answer.unsolved !== undefined && order.op === "set") this.doing.findMost(order);
   }
 
   async post(path, order) {
@@ -399,7 +407,10 @@ class Studio {
     if (answer.exists && window.confirm(`${answer.exists} is there already: write over it?`)) {
       answer = await this.ask("export", "writing…", { kind, song, again: true });
     }
-    this.tell(answer.told ?? answer.error ?? "nothing was written", Boolean(answer.error));
+    if (!answer.file) return this.tell(answer.error ?? "nothing was written", Boolean(answer.error));
+    const link = element("a", { textContent: answer.file, href: `files/${encodeURIComponent(answer.file)}${location.search}`, target: "_blank" });
+    this.tell("wrote ");
+    this.tools.say.append(link);
   }
 
   // Another motion of the file; what was copied can be pasted there.
@@ -439,6 +450,7 @@ class Studio {
     const isTyping = event.target.matches("input, select, textarea");
     const isCommand = event.ctrlKey || event.metaKey;
     if (document.querySelector("dialog[open]")) return;
+    if (event.key === "Escape" && this.doing.isOn) return void this.doing.cancel();
     if (event.key === "Escape" && this.selected !== null) return void this.giveUp();
     if (isTyping || (!isCommand && event.altKey)) return;
     const bare = {

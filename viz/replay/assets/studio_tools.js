@@ -30,7 +30,7 @@ class Tools {
     this.fill(studio);
     this.notes = element("p", { id: "studio-notes" });
     this.show = this.button("do", "show", "Make a show", "Writes a motion that plays the others one after the other, in the order of the file");
-    this.box.append(this.tabs, this.show, this.say, this.robot, this.row, this.changes, this.notes);
+    this.box.append(this.tabs, this.show, this.say, studio.doing.line, this.robot, this.row, this.changes, studio.doing.why, this.notes);
   }
 
   fill(studio) {
@@ -38,8 +38,8 @@ class Tools {
     this.row.append(
       this.group("History", this.button("op", "undo", "Undo", "Ctrl+Z"), this.button("op", "redo", "Redo", "Ctrl+Y")),
       this.group("Moves",
-        this.list("Insert a move", "Insert…", "Puts a move behind the chosen one, or at the end (I)", palette, (title) => studio.insert(title)),
-        this.button("ask", "library", "Library…", "Plays a motion of the library behind the chosen move, or at the end (A)"),
+        this.list("Insert a move", "Insert…", "Puts a move behind the chosen one; with none chosen at the playhead, or at the end while that is at the start (I)", palette, (title) => studio.insert(title)),
+        this.button("ask", "library", "Library…", "Plays a motion of the library behind the chosen move, or where Insert would put one (A)"),
         this.button("op", "duplicate", "Duplicate", "Once more, behind it (D)"),
         this.button("do", "split", "Split", "Makes two of a move, at the playhead (K)"),
         this.button("op", "delete", "Delete", "Delete"),

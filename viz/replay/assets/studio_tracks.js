@@ -52,7 +52,7 @@ class Tracks {
       const ends = [];
       const last = []; // of each row
       bars.forEach((bar, index) => {
-        if (!bar.parts.includes(lane) || bar.name === "also") return;
+        if (!lanesOf(bar).includes(lane) || bar.name === "also") return;
         let row = ends.findIndex((end) => end <= bar.span[0] + 1e-6);
         if (row < 0) row = ends.push(0) - 1;
         ends[row] = bar.span[2];
@@ -76,6 +76,8 @@ class Tracks {
     const [name, hint] = LANE_NAMES[lane] ?? [lane, `The ${LEG_NAMES[lane]} foot`];
     const strip = element("div");
     strip.style.height = `${ROW * rows}px`;
+    const { legs, leg_colors: colors } = this.data.header;
+    if (legs.includes(lane)) row.style.setProperty("--leg", colors[legs.indexOf(lane)]);
     row.append(element("span", { textContent: name, title: hint }), strip);
     this.strips.set(lane, strip);
     return row;
@@ -131,7 +133,8 @@ class Tracks {
   fill(button, { bar, index, row, lane }) {
     const { chosen, selected } = this.studio;
     const isOn = chosen.has(index);
-    const isStop = index === (selected ?? 0) && (lane === bar.parts[0] || !this.strips.has(bar.parts[0]));
+    const [first] = lanesOf(bar);
+    const isStop = index === (selected ?? 0) && (lane === first || !this.strips.has(first));
     button.tabIndex = isStop ? 0 : -1;
     const stamp = JSON.stringify([bar.name, bar.values, bar.span, bar.broken, isOn, row, bar.site]);
     if (button.stamp === stamp) return;
@@ -141,7 +144,7 @@ class Tracks {
     button.classList.toggle("foreign", !isOwn(bar));
     button.setAttribute("aria-pressed", String(isOn));
     button.style.top = `${ROW * row + 1}px`;
-    button.title = toldOf(bar);
+    button.title = toldOf(bar, this.editor.bars);
     button.setAttribute("aria-label", button.title.replaceAll("\n", " "));
     const hasEdge = isOwn(bar) && lengthOf(bar);
     const edge = button.querySelector("em");
@@ -318,7 +321,7 @@ class Tracks {
   }
 
   // Focus and view go to a bar.
-  reveal(index, lane = this.editor.bars[index].parts.find((part) => this.strips.has(part))) {
+  reveal(index, lane = lanesOf(this.editor.bars[index]).find((part) => this.strips.has(part))) {
     const [start, , end] = this.editor.bars[index].span;
     const { view } = this;
     if (start < view.from || end > view.from + view.length) view.set((start + end - view.length) / 2, view.length);
@@ -343,6 +346,13 @@ function cut(text, room, widthOf) {
 /** @param {Bar} bar */
 function ratio(bar) {
   return lengthOf(bar).value / Math.max(bar.span[2] - bar.span[1], 1e-6);
+}
+
+// Where a call is drawn: what all four feet do together is one bar, not four that are alike.
+/** @param {Bar} bar */
+function lanesOf({ parts }) {
+  const feet = Object.keys(LEG_NAMES);
+  return feet.every((leg) => parts.includes(leg)) ? [...parts.filter((part) => !feet.includes(part)), "robot"] : parts;
 }
 
 // Whether a call stands in the file that is open.

@@ -3,7 +3,7 @@
 
 const LEG_NAMES = { FL: "front left", FR: "front right", RL: "rear left", RR: "rear right" };
 const LANE_NAMES = {
-  trunk: ["Body", "What the trunk does"], robot: ["All", "What the whole robot does: jumps, lifts"],
+  trunk: ["Body", "What the trunk does"], robot: ["All", "What the whole robot or all feet do: jumps, walks, turns"],
   time: ["Time", "Pauses, tempo, and what is done to the motion as a whole"],
 };
 const CALL_NAMES = {
@@ -94,8 +94,11 @@ function short(value) {
 }
 
 // All that is known of a bar, for a tooltip and for those who hear the page.
-/** @param {Bar} bar */
-function toldOf(bar) {
+/**
+ * @param {Bar} bar
+ * @param {Bar[]} bars
+ */
+function toldOf(bar, bars) {
   const feet = bar.parts.filter((part) => LEG_NAMES[part]).map((part) => LEG_NAMES[part]);
   const whose = feet.length && feet.length < 4 ? `${feet.join(", ")}: ` : "";
   const [start, move, end] = bar.span;
@@ -103,8 +106,20 @@ function toldOf(bar) {
     `${readable(whose + described(bar)[0])}. From ${start.toFixed(2)} to ${end.toFixed(2)} s.`,
     move > start + 0.01 ? `Hatched: for ${(move - start).toFixed(2)} s the trunk shifts over the feet that stay.` : "",
     bar.broken && `The robot cannot do it: ${bar.broken}`,
-    isOwn(bar) ? `${bar.name}(), line ${bar.site[0]}${bar.runs > 1 ? `, time ${bar.number + 1} of ${bar.runs}` : ""}` : `${bar.name}(), in another file`,
+    isOwn(bar) ? `${bar.name}(), line ${bar.site[0]}${bar.runs > 1 ? `, time ${bar.number + 1} of ${bar.runs}` : ""}` : elsewhere(bar, bars),
   ].filter(Boolean).join("\n");
+}
+
+// Why a bar cannot be changed, and what can: it belongs to a motion that is written elsewhere.
+/**
+ * @param {Bar} bar
+ * @param {Bar[]} bars
+ */
+function elsewhere({ span }, bars) {
+  const around = bars.filter((one) => isOwn(one) && one.parts.includes("time") && one.span[0] <= span[0] + 1e-6 && span[2] <= one.span[2] + 1e-6);
+  const [whole] = around.sort((a, b) => a.span[2] - a.span[0] - b.span[2] + b.span[0]);
+  const which = whole ? `It is part of ${described(whole)[0]}, which is written` : "It is written";
+  return `${which} in another file: it can be changed only there.`;
 }
 
 /**
