@@ -197,22 +197,17 @@ def parts_of(subject: str) -> tuple[str, ...]:
 
 def _curve(series: Series) -> MarginCurve:
     """Of the least margins of steps, where there are more samples than are shown."""
-    columns, count = np.ascontiguousarray(series.margins.T), len(series.times)
-    least = np.fmin.reduce(columns, axis=0)
-    least[np.isnan(least)] = np.inf
+    (least, whose), count = series.least, len(series.times)
     step = -(-count // _MOST_MARGINS)
     steps = np.pad(least, (0, -count % step), constant_values=np.inf).reshape(-1, step)
     rows = step * np.arange(len(steps)) + (steps.argmin(axis=1) if step > 1 else 0)
-    least, worst = least[rows], np.zeros(len(rows), dtype=int)
-    for column in range(len(columns))[::-1]:
-        worst[columns[column, rows] == least] = column
     return MarginCurve(
         name=series.check,
         unit=series.unit,
         time=series.times[rows],
-        margin=np.where(np.isinf(least), np.nan, least),
+        margin=np.where(np.isinf(least), np.nan, least)[rows],
         subjects=series.subjects,
-        worst=worst,
+        worst=whose[rows],
         tight=series.tight,
     )
 

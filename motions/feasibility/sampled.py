@@ -134,12 +134,16 @@ def _joined(change: Change, old: Any, new: Any) -> Any:  # noqa: ANN401 - tables
         return {name: _joined(change, old[name], item) for name, item in new.items()}
     if not is_dataclass(new):
         return new
-    tables = {one.name: getattr(new, one.name) for one in fields(new)}
+    tables = {one.name: getattr(new, one.name) for one in fields(new) if one.init}
     tables = {
         name: change.times if name == "times" else _joined(change, getattr(old, name), table)
         for name, table in tables.items()
     }
-    return replace(new, **tables)
+    whole = replace(new, **tables)
+    if isinstance(whole, Series):
+        least, whose = (_joined(change, *pair) for pair in zip(old.least, new.least, strict=True))
+        whole.knowing((least, whose))
+    return whole
 
 
 def _same(one: Float[np.ndarray, "n k"], other: Float[np.ndarray, "m k"]) -> int:
