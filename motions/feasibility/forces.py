@@ -327,7 +327,7 @@ def errors_of(
     taken = np.where(motion.is_dynamic[:, None], 0.0, pushes)
     errors, dt = np.zeros(taken.shape), float(np.mean(np.diff(motion.times)))
     lag(taken, kp, kd + damping, dt, errors)
-    return np.column_stack([np.linalg.norm(e, axis=1) for e in (errors[:, :3], errors[:, 3:])])
+    return np.sqrt(np.einsum("nij,nij->ni", *2 * [errors.reshape(-1, 2, 3)]))
 
 
 def lost(case: Case, inertia: Float[np.ndarray, "6"]) -> Float[np.ndarray, "n 6"]:

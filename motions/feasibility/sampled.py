@@ -132,7 +132,7 @@ def _joined(change: Change, old: Any, new: Any) -> Any:  # noqa: ANN401 - tables
         return np.concatenate([old[: change.first], own, old[change.last - change.shift :]])
     if isinstance(new, Mapping):
         return {name: _joined(change, old[name], item) for name, item in new.items()}
-    if not is_dataclass(new):
+    if not is_dataclass(new) or isinstance(new, type):
         return new
     tables = {one.name: getattr(new, one.name) for one in fields(new) if one.init}
     tables = {
@@ -140,7 +140,7 @@ def _joined(change: Change, old: Any, new: Any) -> Any:  # noqa: ANN401 - tables
         for name, table in tables.items()
     }
     whole = replace(new, **tables)
-    if isinstance(whole, Series):
+    if isinstance(new, Series) and isinstance(whole, Series):
         least, whose = (_joined(change, *pair) for pair in zip(old.least, new.least, strict=True))
         whole.knowing((least, whose))
     return whole

@@ -255,7 +255,7 @@ class TimelineData:
             last_start=first,
             floor=0.0,
         )
-        longer._require_length(longer.end)
+        longer._require_length(max([longer.cursor, *(key.end for key in keys)]))
         _require_no_overlap([*(key for key in self.keys if key.end >= first - SAME), *keys])
         return longer
 
