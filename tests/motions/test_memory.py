@@ -112,7 +112,15 @@ def jumping(over: float) -> Timeline:
     return line.jump(x=0.05).hold(1.0).foot("FL", z=0.06, over=0.5).down("FL", over=0.5)
 
 
-@pytest.mark.parametrize("line", [turning, jumping])
+def restless(over: float) -> Timeline:
+    """Never at rest where it is cut: what is before it matters for a while."""
+    line = Timeline().body(x=0.01, over=0.5)
+    for k in range(12):
+        line = line.body(x=0.01 * (-1) ** k, over=over if k == 6 else 0.5, ease="linear")
+    return line.home(over=0.5)
+
+
+@pytest.mark.parametrize("line", [turning, jumping, restless])
 def test_what_turns_leaps_or_bears_a_load_is_judged_as_a_whole_too(
     model: RobotModel, line: Callable[[float], Timeline]
 ) -> None:
