@@ -26,6 +26,7 @@ AFTERWARDS = "afterwards"  #: Label of what is shown of a run after its motion
 _AFTERWARDS = 1.0  #: How long [s] a run is shown after the end of its motion
 _TOGETHER = 0.05  #: Annotations on one limit that are this close in time [s] become one
 _LEAST_SAMPLES = 2
+_MOST_MARGINS = 3000  #: Samples of a margin curve
 _MOVED, _TURNED = 0.02, np.radians(2.0)
 """A motion that ends farther from its start, [m] and [rad], moves on."""
 
@@ -195,18 +196,18 @@ def parts_of(subject: str) -> tuple[str, ...]:
 
 
 def _curve(series: Series) -> MarginCurve:
-    worst, least = np.zeros(len(series.times), dtype=int), series.margins[:, 0].copy()
-    for column in range(1, series.margins.shape[1]):  # of rows so short argmin() takes longer
-        one = series.margins[:, column]
-        worst[(one < least) | (np.isnan(least) & ~np.isnan(one))] = column
-        np.fmin(least, one, out=least)
+    """Of the least margins of steps, where there are more samples than are shown."""
+    (least, whose), count = series.least, len(series.times)
+    step = -(-count // _MOST_MARGINS)
+    steps = np.pad(least, (0, -count % step), constant_values=np.inf).reshape(-1, step)
+    rows = step * np.arange(len(steps)) + (steps.argmin(axis=1) if step > 1 else 0)
     return MarginCurve(
         name=series.check,
         unit=series.unit,
-        time=series.times,
-        margin=np.where(np.isinf(least), np.nan, least),
+        time=series.times[rows],
+        margin=np.where(np.isinf(least), np.nan, least)[rows],
         subjects=series.subjects,
-        worst=worst,
+        worst=whose[rows],
         tight=series.tight,
     )
 

@@ -31,20 +31,10 @@ class _Kind:
     def __init__(self) -> None:
         self.places = dict[int, int]()
         self.count, self.values = 0, np.empty((0, 0))
-        self.last: tuple[Keys, Rows] = np.empty(0, np.uint64), np.empty(0, int)
 
     def found(self, keys: Keys) -> Rows:
-        """Where what is known of these rows is; -1 where nothing is.
-
-        Most rows are those of the last time, but for some in the middle.
-        """
-        known, where = self.last
-        count = min(len(keys), len(known))
-        ahead = _same(keys[:count], known[:count])
-        behind = _same(keys[ahead:][::-1], known[ahead:][::-1])
-        middle = keys[ahead : len(keys) - behind].tolist()
-        between = np.array([self.places.get(key, -1) for key in middle], dtype=int)
-        return np.concatenate([where[:ahead], between, where[len(where) - behind :]])
+        """Where what is known of these rows is; -1 where nothing is."""
+        return np.array([self.places.get(key, -1) for key in keys.tolist()], dtype=int)
 
     def add(self, found: Numbers) -> Rows:
         """Keep them; where they are."""
@@ -65,6 +55,7 @@ class Memory:
     def __init__(self) -> None:
         self._kinds = dict[Hashable, _Kind]()
         self._parts = dict[Hashable, Any]()
+        self.last: Any = None  #: What is known of the last motion as a whole
         self._factors = np.random.default_rng(0).integers(2**63, size=256, dtype=np.uint64) | 1
 
     def part(self, key: Hashable, make: Callable[[], Kept]) -> Kept:
@@ -88,7 +79,6 @@ class Memory:
                 new = np.arange(len(keys))
             places[new] = kind.add(work(new))
             kind.places.update(zip(keys[new].tolist(), places[new].tolist(), strict=True))
-        kind.last = keys, places
         return kind.values[places]
 
     def _keys(self, given: Numbers) -> Keys:
@@ -97,13 +87,6 @@ class Memory:
         mixed = whole * self._factors[: whole.shape[1]]
         mixed ^= mixed >> np.uint64(29)
         return np.einsum("ij,j->i", mixed, self._factors[-whole.shape[1] :])
-
-
-def _same(one: Keys, other: Keys) -> int:
-    """How many at the beginning are equal."""
-    count = min(len(one), len(other))
-    differ = np.flatnonzero(one[:count] != other[:count])
-    return int(differ[0]) if len(differ) else count
 
 
 def by_rows(

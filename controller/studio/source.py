@@ -17,7 +17,7 @@ from typing import final
 
 from controller.studio.layout import placed, tail
 from controller.studio.literals import MEMBERS, Literal, Run, literals, resolved
-from controller.studio.syntax import Site, Span, Syntax, value_of
+from controller.studio.syntax import Site, Span, syntax_of, value_of
 from go2_wbc.errors import StudioError, unknown_name
 from motions import Timeline
 
@@ -59,7 +59,7 @@ class Source:
         Raises:
             StudioError: if it is not Python; says the line.
         """
-        self.data, self.syntax = data, Syntax(data)
+        self.data, self.syntax = data, syntax_of(data)
         self.site = None if end is None else self.syntax.site(end)
 
     def slots(self, site: Site, run: Run | None = None) -> list[Slot]:

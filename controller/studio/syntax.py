@@ -6,7 +6,7 @@ import ast
 import re
 from bisect import bisect_right
 from collections.abc import Iterator
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 from go2_wbc.errors import StudioError
 
@@ -97,6 +97,16 @@ class Syntax:
     def line_end(self) -> str:
         """As the file has it."""
         return "\r\n" if b"\r\n" in self.data else "\n"
+
+
+@lru_cache(maxsize=8)
+def syntax_of(data: bytes) -> Syntax:
+    """The tree of a text, not to be changed: while a bar is dragged, that of the saved text stays.
+
+    Raises:
+        StudioError: if it is not Python; says the line.
+    """
+    return Syntax(data)
 
 
 def value_of(node: ast.expr) -> float | str | None:

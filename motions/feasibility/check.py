@@ -29,12 +29,13 @@ from motions.feasibility.bodies import SelfCollision, hulls_of, self_distance
 from motions.feasibility.forces import Case, Forces
 from motions.feasibility.goal_errors import departure_measurements, departures
 from motions.feasibility.report import FeasibilityReport, Series
+from motions.feasibility.sampled import Sampled, sampled_of
 from motions.language.timeline import Timeline
 from motions.language.timeline_data import NEAREST
 from motions.memory import Memory
-from motions.plan.compiled_plan import LEAST_FEET, CompiledPlan, Problem
+from motions.plan.compiled_plan import LEAST_FEET, CompiledPlan, PlanSamples, Problem
 from motions.plan.timeline_compiler import Broken, compile_timeline
-from motions.plan.trajectory import Trajectory, trajectory_of
+from motions.plan.trajectory import Trajectory, samples_of, trajectory_of
 from motions.registry import load_motion
 from motions.saved.files import is_saved_plan, load_plan
 
@@ -252,73 +253,113 @@ class FeasibilityChecker:
         """
         if isinstance(motion, CheckedMotion):
             return motion
-        plan, model, heavy = self._compiled(motion), self.model, self._loaded
-        world, limits, memory = self.world.worst, self._limits, self._memory
-        path = trajectory_of(plan, model, memory)
-        forces = dynamics.forces_of(path, heavy, memory)
+        plan, model = self._compiled(motion), self.model
         whole = plan if isinstance(plan, CompiledPlan) else None
         solved = whole if whole is not None and whole.dynamic else None
-        if solved is not None:
-            forces = dynamic_spans.with_spans(forces, path, solved, model)
-        forces = dynamics.resisted(forces, path, world)
+        spans = () if whole is None else whole.dynamic
+        work = partial(self._sampled, plan)
+        sampled = sampled_of(samples_of(plan, model), spans, work, self._memory)
         report = FeasibilityReport.of(
             plan.name,
             plan.duration,
-            self._judged(Case(path, forces, model, heavy, world, limits, memory), plan),
+            self._judged(sampled, plan),
             None if whole is None else whole.end_pose,
             departures=() if solved is None else departures(solved, model),
             world=self.world,
         )
-        return CheckedMotion(plan, report, path, forces, model.description.profile.name)
+        return CheckedMotion(
+            plan, report, sampled.path, sampled.forces, model.description.profile.name
+        )
 
-    def _judged(self, case: Case, plan: MotionPlan) -> list[Series]:
-        """Every check, causes before what follows from them."""
-        limits = case.limits
-        problems, in_flight = (), []
-        if isinstance(plan, CompiledPlan):
-            problems = plan.problems
-            if plan.dynamic:
-                in_flight = dynamic_spans.judged(plan, case)
+    def _sampled(
+        self, plan: MotionPlan, asked: PlanSamples, before: Trajectory | None, start: int
+    ) -> Sampled:
+        """What is ``asked``: all, or what is new to a motion ``before``, from row ``start`` on."""
+        model, heavy, world, memory = self.model, self._loaded, self.world.worst, self._memory
+        rpy = None if before is None else before.rpy[start]
+        path = trajectory_of(plan, model, memory, asked, rpy)
+        inertia = dynamics.inertia_of(before or path, heavy)
+        forces = dynamics.forces_of(path, heavy, memory, inertia)
+        if isinstance(plan, CompiledPlan) and plan.dynamic:
+            forces = dynamic_spans.with_spans(forces, path, plan, model)
+        forces = dynamics.resisted(forces, path, world)
+        places = dynamics.places_of(path, model)
+        case = Case(path, forces, places, model, heavy, world, self._limits, memory)
         carried = case
-        if case.heavy is not case.model:
-            carried = replace(case, path=_with_load(case.path, case.heavy))
+        if heavy is not model:
+            carried = replace(case, path=_with_load(path, heavy))
         com, zero_moment_point = dynamics.support(carried)
         if carried is not case:  # the controller feels the load, and shifts the CoM back
             own = dynamics.support(case)[0]
             margins = np.minimum(com.margins, own.margins)
             com = replace(com, values=np.minimum(com.values, own.values), margins=margins)
-        lag, slip = dynamics.lagging(case), dynamics.slip(case)
-        wrench, load = dynamics.contacts(case)
+        series = (
+            kinematic.reach(case),
+            kinematic.joint_position(case),
+            kinematic.clearance(case, self._hulls),
+            kinematic.dragging(case),
+            *kinematic.landing(case),
+            com,
+            kinematic.joint_speed(case),
+            kinematic.smoothness(case),
+            zero_moment_point,
+            *dynamics.contacts(case),
+            dynamics.friction(case),
+            *dynamics.torque(case),
+        )
+        return Sampled(
+            path=path,
+            forces=forces,
+            places=places,
+            p_com=carried.path.p_com,
+            lost=dynamics.lost(case, inertia),
+            creep=dynamics.creep(path, heavy),
+            series={one.check: one for one in series},
+        )
+
+    def _judged(self, sampled: Sampled, plan: MotionPlan) -> list[Series]:
+        """Every check, causes before what follows from them."""
+        limits, found, heavy = self._limits, sampled.series, self._loaded
+        own = (sampled.path, sampled.forces, sampled.places, self.model, heavy)
+        case = Case(*own, self.world.worst, limits, self._memory)
+        problems, in_flight = (), []
+        if isinstance(plan, CompiledPlan):
+            problems = plan.problems
+            if plan.dynamic:
+                in_flight = dynamic_spans.judged(plan, case)
+        carried = replace(case, path=replace(case.path, p_com=sampled.p_com))
+        lag, slip = dynamics.lagging(case, sampled.lost), dynamics.slip(case, sampled.creep)
+        com, zero_moment_point, grip = found["support"], found["support of ZMP"], found["friction"]
+        wrench, load = found["contact wrench"], found["foot load"]
         is_off, slips = com.is_broken or lag.is_broken, slip.is_broken or lag.is_broken
         slides = max(map(slip.worst, LEGS)) > SLIDING * limits.slip
         lacks = wrench.worst(0, begin=dynamics.SPREAD) > limits.jolt
         is_lacking = lag.is_broken or (slides and lacks)
-        grip = dynamics.friction(case)
-        landing_place, flat_landing, landing_speed = kinematic.landing(case)
         return [
             *_missed(problems, case),
-            kinematic.reach(case),
-            kinematic.joint_position(case),
+            found["reach"],
+            found["joint position"],
             self_distance(case, self._collision),
-            kinematic.clearance(case, self._hulls),
-            kinematic.dragging(case),
-            landing_place,
-            flat_landing,
+            found["clearance"],
+            found["dragging"],
+            found["landing place"],
+            found["flat landing"],
             kinematic.ends(case, plan),
             *(_failed(problem) for problem in problems if is_off and problem.check == "balance"),
             com,
-            kinematic.joint_speed(case),
-            landing_speed,
-            kinematic.smoothness(case),
+            found["joint speed"],
+            found["landing speed"],
+            found["continuity"],
             zero_moment_point if lag.is_broken else zero_moment_point.downgraded(),
             wrench if is_lacking else wrench.downgraded(),
             load if slips else load.downgraded(),
             lag,
             tracking.tipping(carried, zero_moment_point.values[:, 0]),
-            tracking.tracking(case),
+            tracking.tracking(case, sampled.lost),
             grip if slips else grip.downgraded(),
             slip,
-            *dynamics.torque(case),
+            found["torque"],
+            found["torque at speed"],
             *in_flight,
         ]
 

@@ -55,6 +55,8 @@ def with_spans(forces: Forces, path: Trajectory, plan: CompiledPlan, model: Robo
     v = path.v[:, 6:].copy()
     for span in plan.dynamic:
         rows = (path.times >= span.start) & (path.times < span.end)
+        if not rows.any():
+            continue
         found = span.at(path.times[rows], model)
         contact[rows], tau[rows], missing[rows] = found.forces, found.tau, 0.0
         v[rows] = found.v_motors

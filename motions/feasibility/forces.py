@@ -37,7 +37,7 @@ speed dJ/dt v / b, and as the plan's feet rest, dJ/dt v = -J a. Fast rocking mak
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -95,19 +95,12 @@ class Case:
 
     path: Trajectory  #: the movement
     forces: Forces  #: what it takes
+    places: Float[np.ndarray, "n 4 3"]  #: (n, 4, 3) where the feet's centres are [m]; ``places_of``
     model: RobotModel  #: the robot that it was planned for
     heavy: RobotModel  #: the robot that does it, with the load of the world
     world: World = World()  #: with the worst of what is uncertain
     limits: FeasibilityLimits = FeasibilityLimits()  #: what must be kept
     memory: Memory | None = None  #: of movements that are like it
-    places: Float[np.ndarray, "n 4 3"] = field(init=False)
-    """(n, 4, 3) where the feet's centres are [m], in the frame of the motion."""
-
-    def __post_init__(self) -> None:
-        """Place the feet."""
-        q, R = self.path.q, attitudes(self.path.rpy)
-        places = foot_centres(q[:, :3], R, q[:, 7:], self.model)
-        object.__setattr__(self, "places", places)
 
     def series(
         self,
@@ -176,8 +169,25 @@ SETTLED = 0.1
 NEARBY = np.array([-2.0, 2.0]) * SETTLED  #: Times that hold all of these
 
 
-def forces_of(motion: Trajectory, model: RobotModel, memory: Memory | None = None) -> Forces:
-    """Contact forces and torques along ``motion``; ``memory``: of motions that are like it."""
+def places_of(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "n 4 3"]:
+    """Where the feet's centres are [m], in the frame of the motion."""
+    q = motion.q
+    return foot_centres(q[:, :3], attitudes(motion.rpy), q[:, 7:], model)
+
+
+def forces_of(
+    motion: Trajectory,
+    model: RobotModel,
+    memory: Memory | None = None,
+    inertia: Float[np.ndarray, "6"] | None = None,
+) -> Forces:
+    """Contact forces and torques along ``motion``.
+
+    Args:
+        motion, model: what moves.
+        memory: of motions that are like it.
+        inertia: see ``inertia_of``; of a part of a motion, that of the whole.
+    """
 
     def dynamics(rows: Rows) -> Float[np.ndarray, "k 18"]:
         states = zip(motion.q[rows], motion.v[rows], motion.a[rows], strict=True)
@@ -185,7 +195,8 @@ def forces_of(motion: Trajectory, model: RobotModel, memory: Memory | None = Non
 
     given = np.hstack([motion.q[:, 3:], motion.v, motion.a])  # it is the same everywhere
     needed = _spread(by_rows(memory, "dynamics", given, dynamics), motion)
-    scale, R = weights_of(motion, model), attitudes(motion.rpy)
+    scale = weights_of(inertia_of(motion, model) if inertia is None else inertia, model)
+    R = attitudes(motion.rpy)
     tables = (leg_table(model), friction_pyramid(PYRAMID), scale, numbers_of(model))
 
     def loads(rows: Rows) -> Float[np.ndarray, "k 26"]:
@@ -220,18 +231,18 @@ def numbers_of(model: RobotModel) -> LoadNumbers:
     return packed(LoadNumbers(EVENNESS, weight, NORMAL_FORCE_MAX, model.foot_radius))
 
 
-def weights_of(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "6"]:
+def weights_of(inertia: Float[np.ndarray, "6"], model: RobotModel) -> Float[np.ndarray, "6"]:
     """What a missing wrench costs, over a missing force: as in the whole-body controller.
 
     That weighs accelerations, so moments count by the mass over the moments of inertia, and by the
     weight of the attitude: where the ground cannot give both, the trunk stays level and lags.
     """
-    config, inertia = WbcConfig(), _inertia(motion, model)
+    config = WbcConfig()
     turning = np.sqrt(config.orientation_weight / config.position_weight)
     return np.concatenate([np.ones(3), turning * model.mass / inertia[3:]])
 
 
-def _inertia(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "6"]:
+def inertia_of(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "6"]:
     """Mass [kg] and moments of inertia [kg m^2] of the robot as it stands at first."""
     return np.diag(model.snapshot(state_at(motion, 0)).mass_matrix)[:6]
 
@@ -288,15 +299,16 @@ def contacts(case: Case) -> tuple[Series, Series]:
     )
 
 
-def lagging(case: Case) -> Series:
+def lagging(case: Case, pushes: Float[np.ndarray, "n 6"]) -> Series:
     """How far the trunk is off its plan, since the ground cannot give what it needs: m, rad.
 
     The controller pulls it back, with the gains that it has, so that the error obeys
     e'' + kd e' + kp e = w / m, with the missing force over the mass and the missing moment over the
     moments of inertia of the robot as it stands at first. A moment without them moves little.
+    ``pushes``: what is ``lost``.
     """
     most = np.array([case.limits.lag, case.limits.lag_angle])
-    return case.series("lag", "m, rad", TRUNK, errors_of(case.path, lost(case)), most)
+    return case.series("lag", "m, rad", TRUNK, errors_of(case.path, pushes), most)
 
 
 def errors_of(
@@ -315,18 +327,21 @@ def errors_of(
     taken = np.where(motion.is_dynamic[:, None], 0.0, pushes)
     errors, dt = np.zeros(taken.shape), float(np.mean(np.diff(motion.times)))
     lag(taken, kp, kd + damping, dt, errors)
-    return np.column_stack([np.linalg.norm(e, axis=1) for e in (errors[:, :3], errors[:, 3:])])
+    return np.sqrt(np.einsum("nij,nij->ni", *2 * [errors.reshape(-1, 2, 3)]))
 
 
-def lost(case: Case) -> Float[np.ndarray, "n 6"]:
-    """The acceleration [m/s^2, rad/s^2] that the feet do not give, along world axes."""
+def lost(case: Case, inertia: Float[np.ndarray, "6"]) -> Float[np.ndarray, "n 6"]:
+    """The acceleration [m/s^2, rad/s^2] that the feet do not give, along world axes.
+
+    ``inertia``: of the motion, see ``inertia_of``.
+    """
     motion, forces = case.path, case.forces
     R, p = attitudes(motion.rpy), motion.q[:, :3]
     arms = motion.p_feet - [0.0, 0.0, case.heavy.foot_radius] - p[:, None]
     force = turned(R, forces.wrench[:, :3]) - np.einsum("nij->nj", forces.contact)
     moments = np.einsum("nij->nj", np.cross(arms, forces.contact))
     moment = turned(R, forces.wrench[:, 3:]) - moments
-    return np.hstack([force, moment]) / _inertia(motion, case.heavy)
+    return np.hstack([force, moment]) / inertia
 
 
 def support(case: Case) -> tuple[Series, Series]:
@@ -411,14 +426,14 @@ def friction(case: Case) -> Series:
     return case.series(*what, where=written, tight=TIGHT_FRICTION)
 
 
-def slip(case: Case) -> Series:
-    """How far each foot slides and creeps while it stands [m]."""
+def slip(case: Case, creeps: Float[np.ndarray, "n 4 2"]) -> Series:
+    """How far each foot slides and creeps while it stands [m]; ``creeps``: see ``creep``."""
     motion, floor = case.path, case.world.friction
     counts = _settled(motion) & ~motion.is_dynamic[:, None]
     dt = float(motion.times[-1] - motion.times[0]) / max(len(motion.times) - 1, 1)
     ways = np.zeros(counts.shape)
     held = case.forces.contact + [0.0, 0.0, HELD / floor]  # as a load of that size would
-    slide(held, creep(motion, case.heavy), counts, floor, FOOT_MASS, dt, ways)
+    slide(held, creeps, counts, floor, FOOT_MASS, dt, ways)
     return case.series("slip", "m", FEET, ways, case.limits.slip, where=counts, tight=TIGHT_SLIP)
 
 

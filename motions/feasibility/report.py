@@ -21,14 +21,14 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from go2_wbc.brief import brief, counted, cut, inline_html
 from go2_wbc.errors import MotionInfeasible
@@ -145,6 +145,9 @@ class Finding:
         return f"{line} ({self.note})" if self.note else line
 
 
+Least = tuple[Float[np.ndarray, " n"], Int[np.ndarray, " n"]]
+
+
 @dataclass(frozen=True, slots=True)
 class Series:
     """One check over the whole motion.
@@ -168,13 +171,32 @@ class Series:
     margins: Float[np.ndarray, "n k"]
     tight: float = 0.0
     note: str = ""
+    _least: Least | None = field(default=None, init=False, repr=False, compare=False)
 
     __repr__ = brief
 
     @property
     def is_broken(self) -> bool:
         """Whether any margin is negative."""
-        return bool((self.margins < 0.0).any())
+        return bool((self.least[0] < 0.0).any())
+
+    @property
+    def least(self) -> Least:
+        """The smallest margin at every instant, inf where nothing is checked; whose, as a row."""
+        if self._least is None:
+            columns = np.ascontiguousarray(self.margins.T)
+            least, whose = np.fmin.reduce(columns, axis=0), np.zeros(len(self.times), dtype=int)
+            least[np.isnan(least)] = np.inf
+            for column in range(1, len(columns))[::-1]:
+                whose[columns[column] == least] = column
+            whose[columns[0] == least] = 0
+            object.__setattr__(self, "_least", (least, whose))
+        return self._least or self.least
+
+    def knowing(self, least: Least) -> Series:
+        """Itself; ``least`` is known already."""
+        object.__setattr__(self, "_least", least)
+        return self
 
     @property
     def broken_at(self) -> Float[np.ndarray, " k"]:
@@ -193,25 +215,38 @@ class Series:
 
     def downgraded(self) -> Series:
         """The same with 0 for negative margins: broken for so short that it does no harm."""
-        return replace(self, margins=np.maximum(self.margins, 0.0))
+        least, whose = self.least
+        other = replace(self, margins=np.maximum(self.margins, 0.0))
+        return other.knowing((np.maximum(least, 0.0), whose))
 
     def findings(self) -> list[Finding]:
         """The worst instant of every subject that was checked."""
         is_checked = ~np.isnan(self.margins)
         rows = np.where(is_checked, self.margins, np.inf).argmin(axis=0).tolist()
-        found = []
-        for column in np.flatnonzero(is_checked.any(axis=0)).tolist():
-            row = rows[column]
-            tables = (self.values, self.limits, self.margins)
-            value, limit, margin = (float(table[row, column]) for table in tables)
-            at = (float(self.times[row]), self.subjects[column], value, limit, margin)
-            found.append(Finding(self.check, *at, self.unit, self.note))
-        return found
+        columns = np.flatnonzero(is_checked.any(axis=0)).tolist()
+        return [self._finding(rows[column], column) for column in columns]
+
+    def worst_finding(self) -> Finding | None:
+        """Of all subjects, of several the first; None if nothing was checked."""
+        least = self.least[0]
+        smallest = least.min(initial=np.inf)
+        rows = np.flatnonzero(least == smallest)
+        own = self.margins[rows] == smallest
+        if not own.any():
+            return None
+        column = int(own.any(axis=0).argmax())
+        return self._finding(int(rows[own[:, column].argmax()]), column)
+
+    def _finding(self, row: int, column: int) -> Finding:
+        tables = (self.values, self.limits, self.margins)
+        value, limit, margin = (float(table[row, column]) for table in tables)
+        at = (float(self.times[row]), self.subjects[column], value, limit, margin)
+        return Finding(self.check, *at, self.unit, self.note)
 
     def least_margins(self) -> Float[np.ndarray, " n"]:
         """The smallest margin over the subjects at every instant; nan where nothing is checked."""
-        padded = np.where(np.isnan(self.margins), np.inf, self.margins).min(axis=1)
-        return np.where(np.isinf(padded), np.nan, padded)
+        least = self.least[0]
+        return np.where(np.isinf(least), np.nan, least)
 
 
 @dataclass(frozen=True, slots=True)
@@ -263,10 +298,11 @@ class FeasibilityReport:
         """Draw the conclusions from ``series``, which has causes before their consequences."""
         failures, warnings, margins = [], [], {}
         for item in series:
-            found = item.findings()
-            if not found:
+            worst = item.worst_finding()
+            if worst is None:
                 continue
-            margins[item.check] = min(found, key=lambda finding: finding.margin)
+            margins[item.check] = worst
+            found = item.findings() if worst.margin < max(item.tight, 0.0) else []
             broken = [finding for finding in found if not finding.margin >= 0.0]
             failures += sorted(broken, key=lambda finding: finding.time)
             warnings += [finding for finding in found if 0.0 <= finding.margin < item.tight]

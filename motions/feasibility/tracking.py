@@ -40,13 +40,14 @@ EVERY = 5  #: Samples between those at which the inertia is computed; it changes
 RCOND = 0.05  #: Of a leg's Jacobian: a leg that is nearly stretched turns no faster than this says
 
 
-def tracking(case: forces.Case) -> Series:
+def tracking(case: forces.Case, pushes: Float[np.ndarray, "n 6"]) -> Series:
     """How far the trunk is off its plan in all: m, rad; solved parts, played otherwise, count 0.
 
     In MuJoCo it was off by 1.05 to 1.3 times as much for friction (motions drawn for that alone).
+    ``pushes``: what is ``forces.lost``.
     """
     taken, damping = resistance(case)
-    errors = forces.errors_of(case.path, forces.lost(case) + taken, damping)
+    errors = forces.errors_of(case.path, pushes + taken, damping)
     most = np.array([case.limits.off, case.limits.off_angle])
     return case.series("tracking", "m, rad", forces.TRUNK, errors, most)
 

@@ -293,11 +293,11 @@ class BodyAndFeet(TimelineData):
         line = self
         for leg in sorted(self.raised):
             line = replace(line, cursor=self.cursor).down(leg, over=over)
-        start, end = line._span(over)
+        values, (start, end) = line._body_values, line._span(over)
         keys: list[Key] = [
             BodyKey(start, end, Ease.MINIMUM_JERK, channel, 0.0)
             for channel in BODY_CHANNELS
-            if line.body_value(channel) != 0.0
+            if values.get(channel)
         ]
         if line.shifted_for:
             keys.append(BalanceShift(start, end, Ease.MINIMUM_JERK, frozenset()))

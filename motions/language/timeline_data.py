@@ -218,14 +218,18 @@ class TimelineData:
     @property
     def _away(self) -> list[str]:
         """What its last keys leave elsewhere than at home, in words."""
-        away = [f"body {name}" for name in BODY_CHANNELS if self.body_value(name) != 0.0]
+        values = self._body_values
+        away = [f"body {name}" for name in BODY_CHANNELS if values.get(name)]
         away += [f"foot {leg.name}" for leg in sorted(self.raised)]
         return [*away, "balance"] if self.shifted_for else away
 
     def body_value(self, channel: str) -> float:
         """Where the last key leaves a channel of the body."""
-        values = [key.value for key in self.in_order(BodyKey) if key.channel == channel]
-        return values[-1] if values else 0.0
+        return self._body_values.get(channel, 0.0)
+
+    @property
+    def _body_values(self) -> dict[str, float]:
+        return {key.channel: key.value for key in self.in_order(BodyKey)}
 
     def in_order(self, kind: type[_KeyType]) -> list[_KeyType]:
         """Its keys of one kind, by their starts."""
@@ -251,7 +255,7 @@ class TimelineData:
             last_start=first,
             floor=0.0,
         )
-        longer._require_length(longer.end)
+        longer._require_length(max([longer.cursor, *(key.end for key in keys)]))
         _require_no_overlap([*(key for key in self.keys if key.end >= first - SAME), *keys])
         return longer
 

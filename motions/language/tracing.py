@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from inspect import signature
-from itertools import islice
 from operator import is_
 from types import CodeType, FrameType
 from typing import Any, ClassVar
@@ -141,7 +140,7 @@ def _ends(code: CodeType) -> tuple[tuple[int, int], ...]:
 
 
 def _end_of(code: CodeType, instruction: int) -> tuple[int, int]:
-    return next(islice(_ends(code), instruction // 2, None))
+    return _ends(code)[instruction // 2]
 
 
 def _mark(before: Timeline, after: Timeline, call: Call) -> CallMark:

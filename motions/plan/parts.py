@@ -7,7 +7,6 @@ the whole, as good as, after a pause, or between moves by minimum jerk, which re
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import accumulate, islice, takewhile
 
 from go2_wbc.curves import Ease
@@ -28,7 +27,7 @@ from motions.language.timeline_data import SAME
 PAUSE = 0.15
 """Time [s] without a move after which it does not matter how the last one came to rest: 15 samples,
 over which a spline forgets to a part in 10^8."""
-_DECIMALS = 9  #: Of instants [s] that tell parts apart: less is rounding
+DECIMALS = 9  #: Of instants [s] that tell parts apart: less is rounding
 
 
 def rests(line: Timeline) -> list[float]:
@@ -51,11 +50,6 @@ def rests(line: Timeline) -> list[float]:
             found.append(end)
             first = row + 1
     return found
-
-
-def known_by(keys: Sequence[Key]) -> tuple[Key, ...]:
-    """The keys of a part, their times as far as they matter."""
-    return tuple(key.retimed(lambda t: round(t, _DECIMALS)) for key in keys)
 
 
 def _left(key: Key) -> tuple[object, bool]:

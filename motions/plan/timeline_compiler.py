@@ -34,7 +34,7 @@ from motions.dynamics.solver import PlanTarget
 from motions.language.dynamic_blocks import away_from_home
 from motions.language.keys import BalanceShift, BodyKey, FootHold, Key, Mark, PhaseKey
 from motions.language.timeline import Timeline
-from motions.language.timeline_data import SAME
+from motions.language.timeline_data import SAME, unchecked
 from motions.memory import Memory
 from motions.plan.compiled_plan import (
     CompiledPlan,
@@ -45,7 +45,7 @@ from motions.plan.compiled_plan import (
     event_at,
     placed,
 )
-from motions.plan.parts import known_by, rests
+from motions.plan.parts import DECIMALS, rests
 from motions.plan.quasi_static import UNLOAD_TIME, FootContacts, compile_quasi_static
 from motions.plan.trajectory import Trajectory, trajectory_of
 from motions.postures import standing_feet
@@ -288,7 +288,7 @@ class _Maker:
         if end - start < SHORTEST:
             return
         count, keys = len(self._problems), self._keys(start, end)
-        self._ramp = FootContacts(replace(self._timeline, keys=tuple(keys))).ramp()
+        self._ramp = FootContacts(unchecked(self._timeline, keys=tuple(keys))).ramp()
         for cut in self._cuts:
             if self._time + SHORTEST < cut < end - SHORTEST:
                 self._add_part(self._keys(self._time, cut), cut, Posture.STAND)
@@ -296,9 +296,13 @@ class _Maker:
         self._problems[count:] = _worst(self._problems[count:])
 
     def _keys(self, start: float, end: float) -> list[Key]:
-        """What is written from ``start`` to ``end`` [s], counted from there."""
+        """What is written from ``start`` to ``end`` [s], counted from there.
+
+        Of parts that are remembered, to what matters.
+        """
+        digits = None if self._memory is None else DECIMALS
         return [
-            key.later(-start)
+            key.later(-start) if digits is None else key.retimed(lambda t: round(t - start, digits))
             for key in self._timeline.keys
             if not isinstance(key, PhaseKey | Mark) and start - SAME <= key.start < end - SAME
         ]
@@ -435,7 +439,7 @@ class _Maker:
         feet, model = None if self._feet is self._home else self._feet, self._model
         if self._memory is None:
             return compile_quasi_static(stretch.of(self._timeline), model, feet)
-        stretch = replace(stretch, keys=known_by(stretch.keys), length=round(stretch.length, 9))
+        stretch = replace(stretch, length=round(stretch.length, DECIMALS))
         known = stretch, None if feet is None else tuple(np.round(feet, 9).ravel().tolist())
         return self._memory.part(
             known, lambda: compile_quasi_static(stretch.of(self._timeline), model, feet)

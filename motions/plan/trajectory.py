@@ -55,10 +55,8 @@ class Trajectory:
     __repr__ = brief
 
 
-def trajectory_of(plan: MotionPlan, model: RobotModel, memory: Memory | None = None) -> Trajectory:
-    """The trajectory of ``plan``; of one that does not say where, the feet stand below the hips.
-
-    ``memory``: of plans that are like it.
+def samples_of(plan: MotionPlan, model: RobotModel) -> PlanSamples:
+    """What ``plan`` asks for; of one that does not say where, the feet stand below the hips.
 
     Raises:
         MotionError: if the plan is not finite.
@@ -68,13 +66,38 @@ def trajectory_of(plan: MotionPlan, model: RobotModel, memory: Memory | None = N
     p_feet = standing_feet(model)
     asked = plan.samples(times) if is_compiled else PlanSamples.one_by_one(plan, times, p_feet)
     _require_finite(asked)
+    return asked
+
+
+def trajectory_of(
+    plan: MotionPlan,
+    model: RobotModel,
+    memory: Memory | None = None,
+    asked: PlanSamples | None = None,
+    near: Float[np.ndarray, "3"] | None = None,
+) -> Trajectory:
+    """The trajectory of ``plan``.
+
+    Args:
+        plan, model: what moves.
+        memory: of plans that are like it.
+        asked: what it asks for, or a part of that, which is in no dynamic span where it ends.
+        near: roll, pitch, yaw [rad] of that part at first but for whole turns.
+
+    Raises:
+        MotionError: if the plan is not finite.
+    """
+    asked = samples_of(plan, model) if asked is None else asked
+    times = asked.times
     rpy = np.unwrap(batch_kinematics.angles_of(asked.R), axis=0)
+    if near is not None:
+        rpy += 2.0 * np.pi * np.round((near - rpy[0]) / (2.0 * np.pi))
     placed = batch_kinematics.place(
         replace(asked, R=batch_kinematics.attitudes(rpy)), CENTRING_STEPS, model, memory
     )
     q = batch_kinematics.configurations(np.hstack([placed.p_base, rpy]), placed.q_joints)
     spans = plan.dynamic if isinstance(plan, CompiledPlan) else ()
-    is_dynamic = _are_within(times, spans)
+    is_dynamic = are_within(times, spans)
     v, a = np.zeros((len(times), 18)), np.zeros((len(times), 18))
     for rows in true_runs(~is_dynamic):
         if rows.stop - rows.start > 1:
@@ -113,9 +136,10 @@ def as_written(plan: MotionPlan, path: Trajectory) -> Float[np.ndarray, "n 19"]:
     return q
 
 
-def _are_within(
+def are_within(
     times: Float[np.ndarray, " n"], spans: Sequence[DynamicSpan]
 ) -> Bool[np.ndarray, " n"]:
+    """Which of ``times`` [s] are in one of ``spans``."""
     within = np.zeros(len(times), dtype=bool)
     for span in spans:
         within |= (times >= span.start) & (times < span.end)
@@ -124,7 +148,9 @@ def _are_within(
 
 def _fill(path: Trajectory, span: DynamicSpan, model: RobotModel) -> None:
     """Put the span's own states into its rows of ``path``."""
-    rows = _are_within(path.times, [span])
+    rows = are_within(path.times, [span])
+    if not rows.any():
+        return
     found = span.at(path.times[rows], model)
     path.q[rows], path.v[rows], path.a[rows] = found.q, found.v, found.a
     turns = np.array([pin.Quaternion(q[3:7]).toRotationMatrix() for q in found.q])

@@ -162,3 +162,17 @@ def test_the_page_shows_the_beats_and_the_end_of_a_motion_that_moves_on(
     moved = planned(checker.evaluate(Timeline(name="walk").walk(x=0.2)))
     assert moved.beats == ()
     assert moved.end_pose == pytest.approx((0.2, 0.0, 0.0), abs=1e-6)
+
+
+def test_a_long_curve_keeps_its_least_values_and_says_whose_they_are(nod: CheckedMotion) -> None:
+    times, margins = np.arange(100_000.0), np.ones((100_000, 2))
+    margins[[3, 77_777], [1, 0]], margins[200:300] = (-5.0, -7.0), np.nan
+    (series,) = (one for one in nod.report.series if one.check == "lag")
+    long = replace(series, times=times, values=margins, limits=0 * margins, margins=margins)
+    (curve,) = verdict_of(replace(nod.report, series=(long,))).curves
+    assert len(curve.time) <= 3000
+    broken = [
+        (curve.time[k], curve.subjects[curve.worst[k]]) for k in np.flatnonzero(curve.margin < 0)
+    ]
+    assert broken == [(3.0, "trunk turning"), (77_777.0, "trunk")]
+    assert np.isnan(curve.margin[(curve.time > 210) & (curve.time < 290)]).all()

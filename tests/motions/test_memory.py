@@ -1,9 +1,12 @@
 """Memory: an edited motion, checked with what is known of it, is judged as if nothing were."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.world import World
 from motions import CheckedMotion, FeasibilityChecker, Timeline, deg
 from motions.memory import MOST_ROWS, Memory
 from motions.plan.parts import rests
@@ -93,6 +96,39 @@ def test_only_what_an_edit_has_changed_is_worked_out_again(model: RobotModel) ->
     checker.evaluate(line_of(calls))
     assert (kept() > first).all()
     assert (kept() < 1.3 * first).all()
+
+
+def turning(over: float) -> Timeline:
+    """More than a whole turn, before and after what changes."""
+    line = Timeline().body(z=-0.02, over=0.5).home(over=0.5)
+    for turn in (deg(200.0), deg(200.0)):
+        line = line.walk(turn=turn, gait="trot").body(pitch=0.1, over=over).home(over=0.6)
+    return line.body(roll=0.1, over=0.6).home(over=0.6)
+
+
+def jumping(over: float) -> Timeline:
+    """With a part that is solved."""
+    line = Timeline().body(pitch=0.1, over=over).home(over=0.8).hold(1.0)
+    return line.jump(x=0.05).hold(1.0).foot("FL", z=0.06, over=0.5).down("FL", over=0.5)
+
+
+def restless(over: float) -> Timeline:
+    """Never at rest where it is cut: what is before it matters for a while."""
+    line = Timeline().body(x=0.01, over=0.5)
+    for k in range(12):
+        line = line.body(x=0.01 * (-1) ** k, over=over if k == 6 else 0.5, ease="linear")
+    return line.home(over=0.5)
+
+
+@pytest.mark.parametrize("line", [turning, jumping, restless])
+def test_what_turns_leaps_or_bears_a_load_is_judged_as_a_whole_too(
+    model: RobotModel, line: Callable[[float], Timeline]
+) -> None:
+    world = World(payload=1.0)
+    whole = FeasibilityChecker(model, world=world)
+    by_parts = FeasibilityChecker(model, world=world, memory=Memory())
+    for over in (0.6, 0.65, 0.5, 0.6):
+        assert_alike(by_parts.evaluate(line(over)), whole.evaluate(line(over)))
 
 
 def test_a_motion_that_never_comes_home_has_no_parts() -> None:

@@ -183,17 +183,18 @@ class PosedRobot:
     def feet_along(self, q: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 4 3"]:
         """What ``feet`` says of every configuration."""
         model, places = self._model, np.empty((len(q), 4, 3))
-        base = Rotation.from_quat(q[:, 3:7]).as_matrix()
+        base = Rotation.from_quat(q[:, 3:7]).as_matrix().transpose(1, 2, 0).copy()
+        sines, cosines = np.sin(q.T), np.cos(q.T)
         for leg, frame in enumerate(self._foot_frames):
             foot = model.frames[frame]
-            p = np.tile(foot.placement.translation, (len(q), 1))
+            p = foot.placement.translation[:, None]
             for joint in model.supports[foot.parentJoint].tolist()[:1:-1]:
-                T, angles = model.jointPlacements[joint], q[:, model.idx_qs[joint], None]
+                T, row = model.jointPlacements[joint], model.idx_qs[joint]
                 # About a unit axis with the cross product K: 1 + sin K + (1 - cos) K^2 (Rodrigues).
                 K = pin.skew(np.ravel(model.joints[joint].createData().S)[3:])
-                p = p + np.sin(angles) * (p @ K.T) + (1.0 - np.cos(angles)) * (p @ (K @ K).T)
-                p = p @ T.rotation.T + T.translation
-            places[:, leg] = q[:, :3] + (base @ p[:, :, None])[:, :, 0]
+                p, across, back = (T.rotation @ turn @ p for turn in (np.eye(3), K, K @ K))
+                p = p + sines[row] * across + (1.0 - cosines[row]) * back + T.translation[:, None]
+            places[:, leg] = q[:, :3] + (base * p).sum(axis=1).T
         return places
 
     def on_trunk(self, points: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:

@@ -16,7 +16,7 @@ import re
 import uuid
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from importlib import resources
 from pathlib import Path
 from types import SimpleNamespace
@@ -34,7 +34,7 @@ from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.legs import LEGS
 from go2_wbc.recording import Recording, Span
-from viz.content import MarginCurve, ReplayContent, Verdict, checked_content
+from viz.content import ReplayContent, Verdict, checked_content
 from viz.render.camera import smoothed
 from viz.render.ground import COLORS, grid_of
 from viz.render.mesh import Surface
@@ -194,7 +194,6 @@ _FORCE_PERCENTILE = 99.5  # a touchdown spike beyond it may be cut off in the co
 _LEAST_FORCE_SCALE = 50.0  # [N] a full row of the contact strip is at least this much
 _FRAME_RATE = 50.0  # [Hz] finer is not seen at 60 Hz screens, swings stay smooth
 _MOST_FRAMES = 6000  # keeps the page of a long recording small; the rate drops instead
-_MOST_MARGINS = 3000  # samples of a margin curve; the least of each step is kept
 _CAMERA_SMOOTHING = 0.7  # [s]
 UNKNOWN = -32768  #: Height [mm] of a cell of ground that was not seen
 _PLAIN = {"stance": np.uint8, "margin": np.float32, "torque": np.float32}
@@ -338,7 +337,7 @@ def _binding(spans: tuple[Span, ...], gap: float) -> list[tuple[float, float, st
 
 def _add_verdict(pack: Pack, verdict: Verdict) -> dict[str, object]:
     curves = []
-    for k, curve in enumerate(map(reduced, verdict.ranked())):
+    for k, curve in enumerate(verdict.ranked()):
         pack.add(f"curve{k}.time", curve.time.astype(np.float32))
         pack.add(f"curve{k}.margin", curve.margin.astype(np.float32))
         pack.add(f"curve{k}.worst", curve.worst.astype(np.uint8))
@@ -353,17 +352,6 @@ def _add_verdict(pack: Pack, verdict: Verdict) -> dict[str, object]:
         "world": verdict.world,
         "certified": None if verdict.certified is None else asdict(verdict.certified),
     }
-
-
-def reduced(curve: MarginCurve) -> MarginCurve:
-    """The curve with at most ``_MOST_MARGINS`` samples: the least of each step."""
-    step = -(-len(curve.time) // _MOST_MARGINS)
-    if step <= 1:
-        return curve
-    known = np.where(np.isnan(curve.margin), np.inf, curve.margin)
-    steps = np.pad(known, (0, -len(known) % step), constant_values=np.inf).reshape(-1, step)
-    rows = step * np.arange(len(steps)) + steps.argmin(axis=1)
-    return replace(curve, time=curve.time[rows], margin=curve.margin[rows], worst=curve.worst[rows])
 
 
 HTML_SUFFIXES = (".html", ".htm")

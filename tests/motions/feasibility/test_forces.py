@@ -33,6 +33,7 @@ from motions.feasibility.forces import (
     cone,
     creep,
     forces_of,
+    inertia_of,
     numbers_of,
     scale_of_wrench,
     slip,
@@ -131,7 +132,7 @@ def forces_by_a_dense_solver(motion: Trajectory, model: RobotModel) -> Forces:
         snapshot = model.snapshot(state_at(motion, row))
         needed[row] = snapshot.mass_matrix @ motion.a[row] + snapshot.bias
     needed = _spread(needed, motion)
-    wrench, scale = needed[:, :6], weights_of(motion, model)
+    wrench, scale = needed[:, :6], weights_of(inertia_of(motion, model), model)
     for row in range(count):
         snapshot = model.snapshot(state_at(motion, row))
         shares = motion.load_share[row]
@@ -318,7 +319,7 @@ def test_joints_hold_a_foot_that_lacks_little(
         forces = np.zeros_like(checked.forces.contact)
         forces[:, 0] = 2.5 + lacks, 0.0, 5.0
         given = replace(checked.forces, contact=forces)
-        series = slip(case_of(checked.path, model, given))
+        series = slip(case_of(checked.path, model, given), creep(checked.path, model))
         assert (series.values[:, 0].max() > 0.1) == slides
 
 

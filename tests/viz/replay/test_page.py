@@ -23,7 +23,7 @@ from tests.viz.synthetic import step_ahead
 from tests.viz.verdicts import made_up_verdict
 from viz.content import ReplayContent
 from viz.render.robot_meshes import load_robot_visuals
-from viz.replay.page_data import PAGE_LIMIT, reduced, replay_frames
+from viz.replay.page_data import PAGE_LIMIT, replay_frames
 
 _ROUNDING = 1e-3
 """Steps of the 16-bit numbers [m, rad, N]."""
@@ -213,18 +213,6 @@ def test_what_was_written_is_stored_too(content: ReplayContent, tmp_path: Path) 
     header, arrays = read_data(path.read_text(encoding="utf-8"))
     assert header["written"] == header["ghost"]
     np.testing.assert_allclose(arrays["written.q"], arrays["q"], atol=_ROUNDING)
-
-
-def test_a_long_curve_keeps_its_least_values(content: ReplayContent) -> None:
-    assert content.verdict is not None
-    curve = content.verdict.curves[2]
-    rows = np.arange(100_000) * len(curve.time) // 100_000
-    margin = curve.margin[rows] + 0.01
-    margin[[3, 77_777]] = -5.0, -7.0
-    long = replace(curve, time=np.arange(1e5), margin=margin, worst=curve.worst[rows])
-    few = reduced(long)
-    assert len(few.time) <= 3000
-    assert [t for t, m in zip(few.time, few.margin, strict=True) if m < -1] == [3.0, 77_777.0]
 
 
 @pytest.mark.parametrize("name", ["bow", "high_five", "dance"])
