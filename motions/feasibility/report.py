@@ -182,16 +182,18 @@ class Series:
 
     @property
     def least(self) -> Least:
-        """The smallest margin at every instant, inf where nothing is checked; whose, as a row."""
-        if self._least is None:
+        """Least margin at each instant, inf where nothing is checked; of which subject it is."""
+        known = self._least
+        if known is None:
             columns = np.ascontiguousarray(self.margins.T)
             least, whose = np.fmin.reduce(columns, axis=0), np.zeros(len(self.times), dtype=int)
             least[np.isnan(least)] = np.inf
             for column in range(1, len(columns))[::-1]:
                 whose[columns[column] == least] = column
             whose[columns[0] == least] = 0
-            object.__setattr__(self, "_least", (least, whose))
-        return self._least or self.least
+            known = least, whose
+            object.__setattr__(self, "_least", known)
+        return known
 
     def knowing(self, least: Least) -> Series:
         """Itself; ``least`` is known already."""
