@@ -199,13 +199,16 @@ def _curve(series: Series) -> MarginCurve:
     """Of the least margins of steps, where there are more samples than are shown."""
     (least, whose), count = series.least, len(series.times)
     step = -(-count // _MOST_MARGINS)
-    steps = np.pad(least, (0, -count % step), constant_values=np.inf).reshape(-1, step)
-    rows = step * np.arange(len(steps)) + (steps.argmin(axis=1) if step > 1 else 0)
+    rows = np.arange(0, count, step)
+    if step > 1:
+        steps = np.append(least, np.full(-count % step, np.inf)).reshape(-1, step)
+        rows += np.ascontiguousarray(steps.T).argmin(axis=0)
+    margin = least[rows]
     return MarginCurve(
         name=series.check,
         unit=series.unit,
         time=series.times[rows],
-        margin=np.where(np.isinf(least), np.nan, least)[rows],
+        margin=np.where(np.isinf(margin), np.nan, margin),
         subjects=series.subjects,
         worst=whose[rows],
         tight=series.tight,

@@ -29,14 +29,17 @@ class _Kind:
     """Results of one kind."""
 
     def __init__(self) -> None:
-        self.places = dict[int, int]()
         self.count, self.values = 0, np.empty((0, 0))
+        self._keys, self._places = np.empty(0, np.uint64), np.empty(0, int)  # by keys
 
     def found(self, keys: Keys) -> Rows:
         """Where what is known of these rows is; -1 where nothing is."""
-        return np.array([self.places.get(key, -1) for key in keys.tolist()], dtype=int)
+        at = np.searchsorted(self._keys, keys)
+        is_known = np.append(self._keys, 0)[at] == keys
+        is_known &= at < len(self._keys)
+        return np.where(is_known, np.append(self._places, -1)[at], -1)
 
-    def add(self, found: Numbers) -> Rows:
+    def add(self, keys: Keys, found: Numbers) -> Rows:
         """Keep them; where they are."""
         start, self.count = self.count, self.count + len(found)
         if self.count > len(self.values):
@@ -45,7 +48,11 @@ class _Kind:
                 room[:start] = self.values[:start]
             self.values = room
         self.values[start : self.count] = found
-        return np.arange(start, self.count)
+        places, order = np.arange(start, self.count), np.argsort(keys)
+        at = np.searchsorted(self._keys, keys[order])
+        self._keys = np.insert(self._keys, at, keys[order])
+        self._places = np.insert(self._places, at, places[order])
+        return places
 
 
 @final
@@ -77,8 +84,7 @@ class Memory:
             if kind.count + len(new) > MOST_ROWS:
                 self._kinds[name] = kind = _Kind()
                 new = np.arange(len(keys))
-            places[new] = kind.add(work(new))
-            kind.places.update(zip(keys[new].tolist(), places[new].tolist(), strict=True))
+            places[new] = kind.add(keys[new], work(new))
         return kind.values[places]
 
     def _keys(self, given: Numbers) -> Keys:

@@ -21,6 +21,7 @@ class Task(Enum):
     """What is to be done with a motion."""
 
     CHECK = "check"
+    DRAFT = "draft"  #: check, for a page that knows the arguments: while something is dragged
     EXPORT = "export"  #: check, and have all of the content, not only what the page needs
     PLAY = "play"  #: in MuJoCo, beside the plan
     MEND = "mend"  #: look for changes that make it possible
@@ -69,7 +70,7 @@ class Bar:
     span: tuple[float, float, float]  #: when [s] it starts, its move starts, and it ends
     parts: tuple[str, ...]  #: what it moves: legs, "trunk", "robot" or "time"
     broken: str  #: the first limit that is broken there, in words; empty if none is
-    slots: tuple[Slot, ...]  #: the arguments that are written in it
+    slots: tuple[Slot, ...]  #: the arguments that are written in it; none of a draft
     values: Mapping[str, float | str]  #: of its arguments, as it ran; angles in radians
     callers: tuple[tuple[tuple[int, int], int], ...] = ()  #: see ``motions.language.tracing``
 

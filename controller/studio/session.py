@@ -156,17 +156,21 @@ class Studio:
             source, chosen = self._edited(order), self.motion
         data, site = source.data, dict[str, object](site=source.site)
         longest = LONGEST_SOLVE if self._is_solved else 0.0
-        shown = self._run(data, chosen=chosen, longest=longest)  # what is no motion is not saved
+        is_saved = order.get("commit") is True  # what is no motion is not
+        task = Task.CHECK if is_saved else Task.DRAFT
+        shown = self._run(data, task, chosen=chosen, longest=longest)
         if self._is_solved and not shown.is_solved:
             after = f" in {longest:g} s of work" if shown.content is None else ""
             told = f"no way to do it was found{after}; the motion is as it was."
             return {"error": told, "unsolved": True}
-        if order.get("commit") is True:
+        if is_saved:
             self._project.save(data)
             self._bars, self._is_solved, self.motion = shown.bars, shown.is_solved, shown.title
             self._server.publish(self._content(shown), shown.title)
             return site
-        return self._server.answer({}, self._content(shown), shown.title, order.get("has"))
+        editor = {"bars": [_picked(bar, _DRAFT) for bar in shown.bars]}
+        content = replace(_shown(shown), editor=editor)
+        return self._server.answer({}, content, shown.title, order.get("has"))
 
     def _edited(self, order: Mapping[str, object]) -> Source:
         source = Source(self._project.saved)
@@ -364,7 +368,7 @@ class Studio:
     ) -> Answer:
         motion = chosen or self.motion
         order = Order(self._project.path, data, motion, self._values, task, cut, longest)
-        is_quick = task in (Task.CHECK, Task.EXPORT, Task.SPLIT)
+        is_quick = task in (Task.CHECK, Task.DRAFT, Task.EXPORT, Task.SPLIT)
         answer = (self._runner if is_quick else self._player).run(order)
         if data == self._project.saved and answer.bars:
             self._bars, self._is_solved = answer.bars, answer.is_solved
@@ -403,9 +407,13 @@ class Studio:
             "lanes": ["trunk", *(leg.name for leg in LEGS), "robot", "time"],
         }
         self._motions = shown.motions
-        if shown.content is None:
-            raise StudioError("there is nothing to show")
-        return replace(shown.content, editor=editor)
+        return replace(_shown(shown), editor=editor)
+
+
+def _shown(answer: Answer) -> ReplayContent | Prepared:
+    if answer.content is None:
+        raise StudioError("there is nothing to show")
+    return answer.content
 
 
 def _whole(content: ReplayContent | Prepared) -> ReplayContent:
@@ -419,8 +427,13 @@ def _bar(bar: Bar) -> dict[str, object]:
     """A bar as the page needs it, with the arguments that could be added by a name."""
     given = {slot.of for slot in bar.slots}
     more = [name for name in parameters(bar.name) if name not in {*given, "others"}]
-    slots = [{name: getattr(slot, name) for name in _SLOT} for slot in bar.slots]
-    return {**{name: getattr(bar, name) for name in _BAR}, "slots": slots, "more": more}
+    slots = [_picked(slot, _SLOT) for slot in bar.slots]
+    return {**_picked(bar, _BAR), "slots": slots, "more": more}
+
+
+def _picked(one: Bar | Slot, names: Sequence[str]) -> dict[str, object]:
+    return {name: getattr(one, name) for name in names}
 
 
 _BAR, _SLOT = (tuple(field.name for field in fields(kind)) for kind in (Bar, Slot))
+_DRAFT = ("name", "number", "span", "parts", "broken", "values")  #: What a drag changes of a bar

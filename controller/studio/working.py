@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import threading
 import time
@@ -17,7 +18,7 @@ from typing import TYPE_CHECKING, final
 from controller.studio.literals import Run
 from controller.studio.orders import Answer, Bar, Doing, Order, Task
 from controller.studio.plain import in_words, is_unsolved, plainly
-from controller.studio.source import Source
+from controller.studio.source import Slot, Source
 from controller.studio.splitting import split
 from go2_wbc.errors import Go2WbcError, StudioError
 from go2_wbc.legs import LEGS, Leg
@@ -116,6 +117,7 @@ def serve(pipe: Connection, stop: Event) -> None:
         maker = Maker()
         if order is None:
             _played(checker.evaluate(Timeline().body(z=-0.01, over=0.2)), checker, teller)
+        gc.freeze()  # else each search for what is no longer used goes through all of it
         pipe.send("loaded")
         while True:
             if order is not None:
@@ -162,7 +164,7 @@ def _answer(
 
     sliders = tuple(slider(item, values.get(item.name, item.default)) for item in motion.parameters)
     content = plainly(replace(content, sliders=sliders))
-    bars = tuple(_bars(Source(order.data), str(order.path), made.marks, content))
+    bars = tuple(_bars(order, made.marks, content))
     shown = content if order.task is Task.EXPORT else prepared(content)
     is_solved = not is_unsolved(content)
     return Answer(motion.name, shown, bars, made.names, told, made.notes, is_solved=is_solved)
@@ -194,17 +196,19 @@ def _played(
     return content, f"played in MuJoCo: done, {share}" if result.ok else f"NOT done: {why}"
 
 
-def _bars(
-    source: Source, path: str, marks: Sequence[CallMark], content: ReplayContent
-) -> Iterator[Bar]:
+def _bars(order: Order, marks: Sequence[CallMark], content: ReplayContent) -> Iterator[Bar]:
     runs = Counter((mark.call.file, mark.call.site) for mark in marks)
+    is_draft = order.task is Task.DRAFT
     for mark in marks:
         call = mark.call
-        is_here = call.file == path
+        is_here = call.file == str(order.path)
         parts = tuple(part if isinstance(part, str) else part.name for part in mark.parts)
         values = dict(_values(call.arguments))
         if is_here and "others" in call.arguments:  # which have no name but what is written
-            values["others"] = source.text(call.site).partition("(")[2][:-1]
+            values["others"] = Source(order.data).text(call.site).partition("(")[2][:-1]
+        slots = list[Slot]()
+        if is_here and not is_draft:
+            slots = Source(order.data).slots(call.site, Run(call.number, call.callers))
         yield Bar(
             call.name,
             call.site if is_here else (0, 0),
@@ -213,7 +217,7 @@ def _bars(
             (mark.start, max(mark.move, mark.start), mark.end),
             parts,
             _broken(content, mark.start, mark.end, parts),
-            tuple(source.slots(call.site, Run(call.number, call.callers))) if is_here else (),
+            tuple(slots),
             values,
             call.callers,
         )

@@ -314,6 +314,7 @@ class FeasibilityChecker:
             p_com=carried.path.p_com,
             lost=dynamics.lost(case, inertia),
             creep=dynamics.creep(path, heavy),
+            settled=dynamics.settled(path),
             series={one.check: one for one in series},
         )
 
@@ -328,7 +329,8 @@ class FeasibilityChecker:
             if plan.dynamic:
                 in_flight = dynamic_spans.judged(plan, case)
         carried = replace(case, path=replace(case.path, p_com=sampled.p_com))
-        lag, slip = dynamics.lagging(case, sampled.lost), dynamics.slip(case, sampled.creep)
+        lag = dynamics.lagging(case, sampled.lost)
+        slip = dynamics.slip(case, sampled.creep, sampled.settled)
         com, zero_moment_point, grip = found["support"], found["support of ZMP"], found["friction"]
         wrench, load = found["contact wrench"], found["foot load"]
         is_off, slips = com.is_broken or lag.is_broken, slip.is_broken or lag.is_broken

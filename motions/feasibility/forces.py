@@ -388,11 +388,10 @@ def support(case: Case) -> tuple[Series, Series]:
 def passes_over_few(motion: Trajectory, limits: FeasibilityLimits) -> Bool[np.ndarray, " n"]:
     """Samples in which the same two or three feet stand, for no longer than they may."""
     few = np.isin(motion.stance.sum(axis=1), _FEW)
-    changes = (motion.stance[1:] != motion.stance[:-1]).any(axis=1)
-    for rows in np.split(np.arange(len(few)), np.flatnonzero(changes) + 1):
-        lasts = motion.times[rows[-1]] - motion.times[rows[0]]
-        few[rows] &= lasts <= limits.pair_time
-    return few
+    changes = np.flatnonzero((motion.stance[1:] != motion.stance[:-1]).any(axis=1))
+    first, last = np.append(0, changes + 1), np.append(changes, len(few) - 1)
+    lasts = motion.times[last] - motion.times[first]
+    return few & np.repeat(lasts <= limits.pair_time, last - first + 1)
 
 
 def _same_support(places: Float[np.ndarray, "n 8"]) -> list[Int[np.ndarray, " k"]]:
@@ -426,10 +425,10 @@ def friction(case: Case) -> Series:
     return case.series(*what, where=written, tight=TIGHT_FRICTION)
 
 
-def slip(case: Case, creeps: Float[np.ndarray, "n 4 2"]) -> Series:
-    """How far each foot slides and creeps while it stands [m]; ``creeps``: see ``creep``."""
+def slip(case: Case, creeps: Float[np.ndarray, "n 4 2"], stands: Bool[np.ndarray, "n 4"]) -> Series:
+    """How far each foot slides and creeps [m] while it ``stands``; see ``creep``, ``settled``."""
     motion, floor = case.path, case.world.friction
-    counts = _settled(motion) & ~motion.is_dynamic[:, None]
+    counts = stands & ~motion.is_dynamic[:, None]
     dt = float(motion.times[-1] - motion.times[0]) / max(len(motion.times) - 1, 1)
     ways = np.zeros(counts.shape)
     held = case.forces.contact + [0.0, 0.0, HELD / floor]  # as a load of that size would
@@ -478,7 +477,7 @@ def _least_friction(case: Case) -> Float[np.ndarray, " n"]:
     return by_rows(case.memory, "least friction", np.hstack(given), least)[:, 0]
 
 
-def _settled(motion: Trajectory) -> Bool[np.ndarray, "n 4"]:
+def settled(motion: Trajectory) -> Bool[np.ndarray, "n 4"]:
     """Where feet stand, and have stood and will stand for ``SETTLED``; the motion's ends count."""
     stands, times = motion.stance.copy(), motion.times
     for edge, leg in np.argwhere(motion.stance[1:] != motion.stance[:-1]):

@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from motions.feasibility.forces import Forces
 from motions.feasibility.report import Series
@@ -40,6 +40,7 @@ class Sampled:
     p_com: Float[np.ndarray, "n 3"]  #: CoM of the robot with its load [m]
     lost: Float[np.ndarray, "n 6"]  #: see ``forces.lost``
     creep: Float[np.ndarray, "n 4 2"]  #: see ``forces.creep``
+    settled: Bool[np.ndarray, "n 4"]  #: see ``forces.settled``
     series: Mapping[str, Series]  #: by check
 
 
@@ -106,7 +107,7 @@ def sampled_of(
         change = Change.of(asked, numbers, known.numbers)
         if change is not None:
             part = work(change.part(asked), known.sampled.path, change.start)
-            joined: Sampled = _joined(change, known.sampled, part)
+            joined: Sampled = _joined(change, known.sampled, part, {})
             seam = joined.path.rpy[change.last - 1 : change.last + 1]
             found = None if np.ptp(seam, axis=0).max() > TURN else joined
     found = work(asked, None, 0) if found is None else found
@@ -123,25 +124,32 @@ def _numbers(asked: PlanSamples, is_dynamic: np.ndarray) -> Float[np.ndarray, "n
     return np.hstack(whole + flags)
 
 
-def _joined(change: Change, old: Any, new: Any) -> Any:  # noqa: ANN401 - tables of tables
-    """``old``, with what has changed from ``new``, which begins with row ``start``."""
+def _joined(change: Change, old: Any, new: Any, done: dict[int, Any]) -> Any:  # noqa: ANN401 - tables of tables
+    """``old``, with what has changed from ``new``, which begins with row ``start``.
+
+    ``done``: what was joined, by what was new: some tables are in several places.
+    """
     if isinstance(new, np.ndarray):
         if not old.strides[0] and not new.strides[0]:  # one row that stands for all
             return np.broadcast_to(new[:1], (len(change.times), *new.shape[1:]))
-        own = new[change.first - change.start : change.last - change.start]
-        return np.concatenate([old[: change.first], own, old[change.last - change.shift :]])
+        if id(new) not in done:
+            own = new[change.first - change.start : change.last - change.start]
+            parts = [old[: change.first], own, old[change.last - change.shift :]]
+            done[id(new)] = np.concatenate(parts)
+        return done[id(new)]
     if isinstance(new, Mapping):
-        return {name: _joined(change, old[name], item) for name, item in new.items()}
+        return {name: _joined(change, old[name], item, done) for name, item in new.items()}
     if not is_dataclass(new) or isinstance(new, type):
         return new
     tables = {one.name: getattr(new, one.name) for one in fields(new) if one.init}
     tables = {
-        name: change.times if name == "times" else _joined(change, getattr(old, name), table)
+        name: change.times if name == "times" else _joined(change, getattr(old, name), table, done)
         for name, table in tables.items()
     }
     whole = replace(new, **tables)
     if isinstance(new, Series) and isinstance(whole, Series):
-        least, whose = (_joined(change, *pair) for pair in zip(old.least, new.least, strict=True))
+        pairs = zip(old.least, new.least, strict=True)
+        least, whose = (_joined(change, *pair, done) for pair in pairs)
         whole.knowing((least, whose))
     return whole
 
@@ -151,7 +159,7 @@ def _same(one: Float[np.ndarray, "n k"], other: Float[np.ndarray, "m k"]) -> int
     count = min(len(one), len(other))
     for row in range(0, count, BLOCK):
         rows = slice(row, min(row + BLOCK, count))
-        differ = np.flatnonzero((np.abs(one[rows] - other[rows]) > SAME).any(axis=1))
-        if len(differ):
-            return row + int(differ[0])
+        differ = np.abs(one[rows] - other[rows]) > SAME
+        if differ.any():
+            return row + int(differ.any(axis=1).argmax())
     return count

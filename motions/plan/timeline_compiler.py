@@ -287,7 +287,8 @@ class _Maker:
         start = self._time
         if end - start < SHORTEST:
             return
-        count, keys = len(self._problems), self._keys(start, end)
+        count, keys = len(self._problems), self._written(start, end)
+        keys = [key.later(-start) for key in keys] if start else keys
         self._ramp = FootContacts(unchecked(self._timeline, keys=tuple(keys))).ramp()
         for cut in self._cuts:
             if self._time + SHORTEST < cut < end - SHORTEST:
@@ -300,11 +301,16 @@ class _Maker:
 
         Of parts that are remembered, to what matters.
         """
-        digits = None if self._memory is None else DECIMALS
+        keys = self._written(start, end)
+        if self._memory is None:
+            return [key.later(-start) for key in keys]
+        return [key.retimed(lambda t: round(t - start, DECIMALS)) for key in keys]
+
+    def _written(self, start: float, end: float) -> list[Key]:
         return [
-            key.later(-start) if digits is None else key.retimed(lambda t: round(t - start, digits))
+            key
             for key in self._timeline.keys
-            if not isinstance(key, PhaseKey | Mark) and start - SAME <= key.start < end - SAME
+            if start - SAME <= key.start < end - SAME and not isinstance(key, PhaseKey | Mark)
         ]
 
     def _add_part(self, keys: list[Key], end: float, exit: Posture) -> None:
@@ -355,7 +361,7 @@ class _Maker:
             return
         first, last = np.searchsorted(plan.curves.x, [start - SHORTEST, end - SHORTEST]).tolist()
         knots = plan.curves.x[first : last + 1]
-        curves = PPoly(plan.curves.c[:, first:last], knots - knots[0])
+        curves = PPoly.construct_fast(plan.curves.c[:, first:last], knots - knots[0])
         times = np.array(plan.contacts.times)
         during = times[(times > start) & (times < end)]
         rows = event_at(plan.contacts, np.array([start, *during]))
@@ -488,4 +494,4 @@ def _moved(curves: PPoly, frame: Anchor) -> PPoly:
         c[:, :, column : column + 3] = curves.c[:, :, column : column + 3] @ R.T
         c[3, :, column : column + 3] += frame.p_world
     c[3, :, 5] += frame.yaw
-    return PPoly(c, curves.x)
+    return PPoly.construct_fast(c, curves.x)

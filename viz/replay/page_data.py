@@ -289,7 +289,8 @@ def replay_frames(recording: Recording) -> tuple[float, dict[str, np.ndarray]]:
     below = np.interp(recording.time, wanted, heights)
     places = np.column_stack([recording.q[:, :2], below])
     target = smoothed(recording.time, places, _CAMERA_SMOOTHING)
-    ratio = np.max(np.abs(recording.tau) / visuals.description.efforts, axis=1)
+    ratios = np.ascontiguousarray(np.abs(recording.tau).T)
+    ratios /= np.array(visuals.description.efforts)[:, None]
     return rate, {
         "q": q,
         "feet": feet.reshape(-1, 12),
@@ -298,7 +299,7 @@ def replay_frames(recording: Recording) -> tuple[float, dict[str, np.ndarray]]:
         "forces": np.maximum.reduceat(recording.foot_forces, rows),
         "stance": recording.stance[rows],
         "margin": np.fmin.reduceat(recording.support_margin, rows),
-        "torque": np.maximum.reduceat(ratio, rows),
+        "torque": np.maximum.reduceat(ratios.max(axis=0), rows),
     }
 
 

@@ -117,6 +117,7 @@ def test_a_draft_is_shown_and_not_saved(studio: Studio, file: Path) -> None:
     draft = _shown(answer["data"])
     assert draft["editor"]["bars"][0]["broken"] != "", "the trunk would meet its legs"
     assert not draft["verdict"]["ok"]
+    assert "slots" not in draft["editor"]["bars"][0], "the page knows what is written"
     assert file.read_text(encoding="utf-8") == GREET
     assert _editor(studio) == before
 

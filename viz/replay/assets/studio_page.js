@@ -370,12 +370,12 @@ class Studio {
     this.use(this.player.data.header.editor, site);
   }
 
-  // A draft moves bars; their places in the file are those of what is saved.
-  /** @param {Editor} draft */
+  // A draft moves bars; their arguments and places in the file are those of what is saved.
+  /** @param {{ bars: Partial<Bar>[] }} draft */
   redrawDraft(draft) {
     if (draft.bars.length !== this.editor.bars.length) return;
     this.view.use();
-    const bars = draft.bars.map((bar, index) => ({ ...bar, site: this.editor.bars[index].site }));
+    const bars = draft.bars.map((bar, index) => ({ ...this.editor.bars[index], ...bar }));
     this.tracks.use(this.player.data, { ...this.editor, bars });
     this.hands.use(bars[this.selected]);
   }
