@@ -81,12 +81,14 @@ def compile_quasi_static(
     for shift in timeline.in_order(BalanceShift):
         if shift.is_swaying:
             rows = slice(*np.searchsorted(times, [shift.start - SAME, shift.end + SAME]).tolist())
-            own = shift.start + sample_times(shift.end - shift.start)
-            trunk = body_path(timeline, home, own, footing.at(own))
+            length = shift.end - shift.start
+            own = shift.start + np.linspace(0.0, length, len(sample_times(length)))
+            places = footing.at(own)
+            trunk = body_path(timeline, home, own, places)
             trunk[:, :2] += followed(own, np.zeros(2), shifts)
             stance = contacts.at_times(own).stance
             held = ~(stance | steps[event_at(contacts, own)])
-            now = Instants.of(own, trunk, footing.at(own))
+            now = Instants.of(own, trunk, places)
             way = swayed(now, trunk, stance, held, tracks, model) - trunk[:, :2]
             body[rows, :2] += CubicSpline(own, way, bc_type="clamped")(times[rows])
     now = Instants.of(times, body, ground)

@@ -34,11 +34,13 @@ from motions.language.keys import (
     PostureKey,
 )
 from motions.language.timeline import Timeline
+from motions.language.timeline_data import SAME
 
 SAMPLE_PERIOD = 0.01
 """Time [s] between the instants that are looked at. A cubic spline through samples of f misses it
 by 5/384 h^4 max|d4f/dt4| at most (Hall & Meyer 1976): 0.2 um for a way L of 0.1 m by minimum jerk
 in T = 0.4 s, where the derivative is 360 L / T^4 at most."""
+LEAST_STEPS = 2  #: Of a motion, however short
 LOW = 0.08
 """A foot that stays this far [m] below its hip's axis moves along straight lines; a higher one in
 joint space, since the way of a foot past its hip crosses a singularity of the leg."""
@@ -51,8 +53,14 @@ Move = tuple[Key, Float[np.ndarray, " k"]]
 
 
 def sample_times(duration: float) -> Times:
-    """Instants [s] from the start of a motion to its end."""
-    return np.linspace(0.0, duration, max(round(duration / SAMPLE_PERIOD), 2) + 1)
+    """Instants [s] from the start of a motion to its end, which may be off their even steps.
+
+    So what is as in another motion from its start on is sampled as there, whatever their lengths.
+    """
+    count = max(round(duration / SAMPLE_PERIOD), LEAST_STEPS)
+    if count == LEAST_STEPS or abs(duration - count * SAMPLE_PERIOD) < SAME:
+        return np.linspace(0.0, duration, count + 1)
+    return np.append(SAMPLE_PERIOD * np.arange(count), duration)
 
 
 def followed(

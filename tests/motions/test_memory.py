@@ -131,6 +131,20 @@ def test_what_turns_leaps_or_bears_a_load_is_judged_as_a_whole_too(
         assert_alike(by_parts.evaluate(line(over)), whole.evaluate(line(over)))
 
 
+def test_a_motion_of_an_odd_length_keeps_what_an_edit_leaves(model: RobotModel) -> None:
+    memory, asked = Memory(), list[int]()
+    checker = FeasibilityChecker(model, memory=memory)
+    calls = drawn(np.random.default_rng(5))
+    calls[0][1]["over"] = 0.5037
+    for over in (0.5, 0.55):
+        calls[-1][1]["over"] = over
+        before = sum(kind.count for kind in memory._kinds.values())
+        checked = checker.evaluate(line_of(calls))
+        asked.append(sum(kind.count for kind in memory._kinds.values()) - before)
+        assert_alike(checked, FeasibilityChecker(model).evaluate(line_of(calls)))
+    assert asked[1] < 0.3 * asked[0]
+
+
 def test_a_motion_that_never_comes_home_has_no_parts() -> None:
     line = Timeline().body(z=-0.03, over=0.5).body(z=-0.02, over=0.5).body(z=-0.04, over=0.5)
     assert rests(line) == []
