@@ -78,7 +78,8 @@ def followed(
     last = first
     edges = np.searchsorted(times, [*(key.start for key, _ in moves), np.inf]).tolist()
     for (key, goal), rows in zip(moves, starmap(slice, pairwise(edges)), strict=True):
-        path[rows] = last + _way(key, times[rows], last, goal)
+        if rows.start < rows.stop:  # of a part of a motion, most keys are elsewhere
+            path[rows] = last + _way(key, times[rows], last, goal)
         last = goal
     return path
 
