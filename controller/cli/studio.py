@@ -53,7 +53,11 @@ def run(
             if not live.no_open and display_problem() is None:
                 webbrowser.open(studio.url)
             studio.warm()
+            told = ""
             while True:
+                if not json and studio.told != told:
+                    told = studio.told
+                    print(told or "all jumps are solved")
                 time.sleep(POLL_PERIOD)
                 studio.look()
         except KeyboardInterrupt:

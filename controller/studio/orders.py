@@ -17,6 +17,13 @@ if TYPE_CHECKING:
     from viz.replay.page_data import Prepared
 
 
+AT_ONCE = 1e-6  #: Time [s] to solve a jump for, in which only what is known is found
+
+
+class TooLong(Exception):
+    """A jump was solved for as long as it may."""
+
+
 class Task(Enum):
     """What is to be done with a motion."""
 
@@ -48,6 +55,9 @@ class Order:
     task: Task = Task.CHECK  #: what is done with it
     cut: Cut | None = None  #: where it is split
     longest: float = 0.0  #: processor time [s] that one jump may be solved for; 0: the solver's own
+    is_shown: bool = False  #: also without the jumps that were not found by then
+    is_looked_for: bool = False  #: what was not found is looked for by another process meanwhile
+    is_afresh: bool = False  #: what was not found before may have been found since
 
 
 @dataclass(frozen=True, slots=True)

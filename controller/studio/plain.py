@@ -12,6 +12,7 @@ UNSOLVED = "dynamic plan"  #: The check that is broken where no jump was found
 ENDS = "entry and exit"  #: The check of how a motion starts and ends
 LAST = "exit"  #: Its subjects at the end begin so
 NO_WAY = "no way to do this was found: ask for less"
+LOOKED_FOR = "a way to do this is looked for; until then the robot rests here"
 NOT_HOME = "it must end at rest on four feet, as it begins. All home at the end does that"
 
 
@@ -25,7 +26,7 @@ def plainly(content: ReplayContent) -> ReplayContent:
 
 def in_words(one: Annotation) -> str:
     """What is broken, where that is not said already."""
-    is_plain = one.text in (NO_WAY, NOT_HOME)
+    is_plain = one.text in (NO_WAY, LOOKED_FOR, NOT_HOME)
     return one.text if is_plain else f"{one.limit}, {one.subject}: {one.text}"
 
 
@@ -37,7 +38,7 @@ def is_unsolved(content: ReplayContent) -> bool:
 
 def _words(one: Annotation) -> str:
     if one.limit == UNSOLVED:
-        return NO_WAY
+        return LOOKED_FOR if one.text == LOOKED_FOR else NO_WAY
     if one.limit == ENDS and one.subject.startswith(LAST) and one.text.endswith("home()"):
         return NOT_HOME
     return one.text

@@ -11,6 +11,7 @@ import os
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import cast, final
 
 from controller.studio.orders import Answer, Doing, Order
@@ -34,6 +35,7 @@ class Runner:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self.tell: Callable[[Doing | None], None] = lambda _: None
+        self._is_over = False
         self._start()
 
     def _start(self) -> None:
@@ -51,7 +53,7 @@ class Runner:
 
     def warm(self) -> None:
         """Load all that playing takes, meanwhile; the first order waits for it."""
-        with self._lock:
+        with self._lock, suppress(OSError):  # of a process that has ended the next order tells
             if not self._is_warm:
                 self._pipe.send(None)
 
@@ -63,6 +65,8 @@ class Runner:
                 process: the next one runs in another.
         """
         with self._lock:
+            if self._is_over:
+                raise StudioError("the studio has ended")
             self._stop.clear()
             try:
                 self._pipe.send(order)
@@ -96,11 +100,16 @@ class Runner:
         raise StudioError(f"the file {otherwise}; it was stopped")
 
     def _restart(self) -> None:
-        self.close()
-        self._start()
+        self._end()
+        if not self._is_over:
+            self._start()
 
     def close(self) -> None:
         """End the process."""
+        self._is_over = True
+        self._end()
+
+    def _end(self) -> None:
         self._process.kill()
         self._process.join()
         self._pipe.close()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import secrets
 import threading
 from collections.abc import Mapping, Sequence
@@ -14,7 +15,8 @@ from typing import final
 import viz
 from controller.studio.edits import PALETTE, edited, run_of, site_of
 from controller.studio.library import library
-from controller.studio.orders import Answer, Bar, Cut, Doing, Order, Task
+from controller.studio.orders import AT_ONCE, Answer, Bar, Cut, Doing, Order, Task
+from controller.studio.plain import NO_WAY
 from controller.studio.project import Project
 from controller.studio.rewriting import offers
 from controller.studio.running import Runner
@@ -32,6 +34,8 @@ from motions.language.steps import STEP_GAITS
 from viz.content import ReplayContent
 from viz.replay.page_data import Prepared
 from viz.replay.preview_server import PreviewServer
+
+_log = logging.getLogger(__name__)
 
 HISTORY = ("undo", "redo")
 LONGEST_SOLVE, LONGEST_TRY = 6.0, 3.0
@@ -77,14 +81,14 @@ class Studio:
         self._lock, self.motion = threading.RLock(), motion
         self._doing = dict[str, Doing]()
         self._runner, self._player = Runner(), Runner()
-        self._is_solved = True  # all that jumps in what is saved
+        self._is_solved = self._is_looking = True  # all that jumps in what is saved; for what does
         self._changes: tuple[str, ...] = ()
         self._copied: tuple[str, ...] = ()
         self._motions: tuple[str, ...] = ()
         self._bars: tuple[Bar, ...] = ()
         try:
-            shown = self._run(self._project.saved, Task.EXPORT)
-            self.motion = shown.title
+            shown = self._run(self._project.saved, Task.EXPORT, longest=AT_ONCE)
+            self.motion, self._is_looking = shown.title, not shown.is_solved
             token = secrets.token_urlsafe(16)
             self._server = PreviewServer(
                 _whole(self._content(shown)),
@@ -111,10 +115,31 @@ class Studio:
         self._runner.tell = partial(self._told_of, "edit")
         self._player.tell = partial(self._told_of, "play")
         self.url = f"{self._server.url}?token={token}"
+        self._search = threading.Thread(target=self._look_for_jumps, daemon=True)
+        if self._is_looking:
+            self._search.start()
 
     def warm(self) -> None:
         """Load what playing takes, meanwhile: the first time then is as short as the others."""
-        self._player.warm()
+        threading.Thread(target=self._player.warm, daemon=True).start()
+
+    @property
+    def told(self) -> str:
+        """What there is to say of the jumps of the file; nothing where all of them are solved."""
+        if self._is_looking:
+            return f"a jump is looked for meanwhile, for at most {LONGEST_SOLVE:g} s of work"
+        return "" if self._is_solved else f"a jump: {NO_WAY}"
+
+    def _look_for_jumps(self) -> None:
+        """In the process that plays: edits go on; the plans are kept, and found by the other."""
+        self._player.warm()  # which it is for once; it takes no longer than a jump
+        try:
+            self._player.run(self._order(self._project.saved, Task.CHECK, LONGEST_SOLVE))
+        except StudioError as error:
+            _log.info("no jump is looked for: %s", error)
+        with self._lock:
+            self._is_looking = False
+            self.show(is_afresh=True)
 
     def edit(self, order: Mapping[str, object]) -> dict[str, object] | bytes:
         """Do what a page asks for.
@@ -155,12 +180,11 @@ class Studio:
         else:
             source, chosen = self._edited(order), self.motion
         data, site = source.data, dict[str, object](site=source.site)
-        longest = LONGEST_SOLVE if self._is_solved else 0.0
         is_saved = order.get("commit") is True  # what is no motion is not
         task = Task.CHECK if is_saved else Task.DRAFT
-        shown = self._run(data, task, chosen=chosen, longest=longest)
+        shown = self._run(data, task, chosen=chosen, longest=LONGEST_SOLVE)
         if self._is_solved and not shown.is_solved:
-            after = f" in {longest:g} s of work" if shown.content is None else ""
+            after = f" in {LONGEST_SOLVE:g} s of work" if shown.content is None else ""
             told = f"no way to do it was found{after}; the motion is as it was."
             return {"error": told, "unsolved": True}
         if is_saved:
@@ -217,7 +241,8 @@ class Studio:
                 return {"error": unknown_name("motion", str(name), self._motions)}
             self.motion, self._values = name, {}
             try:
-                self._server.publish(self._content(self._run(self._project.saved)), name)
+                shown = self._run(self._project.saved, longest=LONGEST_SOLVE)
+                self._server.publish(self._content(shown), name)
             except StudioError as error:
                 self.motion = before
                 return {"error": str(error)}
@@ -329,10 +354,14 @@ class Studio:
             self.show()
             return True
 
-    def show(self) -> None:
-        """Run what the file says and show it, or why it is no motion."""
+    def show(self, *, is_afresh: bool = False) -> None:
+        """Run what the file says and show it, or why it is no motion.
+
+        ``is_afresh``: with the jumps that were found meanwhile, and no others.
+        """
+        longest = AT_ONCE if is_afresh else LONGEST_SOLVE
         try:
-            shown = self._run(self._project.saved)
+            shown = self._run(self._project.saved, longest=longest, is_afresh=is_afresh)
             self.motion = shown.title  # another one, if that has gone
             self._server.publish(self._content(shown), shown.title)
         except StudioError as error:
@@ -365,14 +394,28 @@ class Studio:
         cut: Cut | None = None,
         chosen: str | None = None,
         longest: float = 0.0,
+        *,
+        is_afresh: bool = False,
     ) -> Answer:
-        motion = chosen or self.motion
-        order = Order(self._project.path, data, motion, self._values, task, cut, longest)
+        order = self._order(data, task, longest, chosen)
+        order = replace(order, cut=cut, is_afresh=is_afresh)
         is_quick = task in (Task.CHECK, Task.DRAFT, Task.EXPORT, Task.SPLIT)
         answer = (self._runner if is_quick else self._player).run(order)
         if data == self._project.saved and answer.bars:
             self._bars, self._is_solved = answer.bars, answer.is_solved
         return answer
+
+    def _order(self, data: bytes, task: Task, longest: float, chosen: str | None = None) -> Order:
+        return Order(
+            self._project.path,
+            data,
+            chosen or self.motion,
+            self._values,
+            task,
+            longest=longest,
+            is_shown=longest > 0.0 and (data == self._project.saved or not self._is_solved),
+            is_looked_for=self._is_looking,
+        )
 
     def _told_of(self, which: str, doing: Doing | None) -> None:
         """Pages show how far the process is that edits, or the one that plays."""

@@ -16,7 +16,7 @@ from multiprocessing.synchronize import Event
 from typing import TYPE_CHECKING, final
 
 from controller.studio.literals import Run
-from controller.studio.orders import Answer, Bar, Doing, Order, Task
+from controller.studio.orders import AT_ONCE, Answer, Bar, Doing, Order, Task, TooLong
 from controller.studio.plain import in_words, is_unsolved, plainly
 from controller.studio.source import Slot, Source
 from controller.studio.splitting import split
@@ -25,6 +25,7 @@ from go2_wbc.legs import LEGS, Leg
 
 if TYPE_CHECKING:
     from controller.go2_controller import GO2Controller
+    from controller.studio.jumping import Jumps
     from controller.studio.making import Maker
     from motions import CheckedMotion, FeasibilityChecker
     from motions.language.tracing import CallMark
@@ -33,10 +34,6 @@ if TYPE_CHECKING:
 
 STOPPED = "stopped: the motion is as it was"
 PERIOD = 0.1  #: s, between two words of how far it is
-
-
-class _TooLong(Exception):
-    """A jump was solved for as long as it may."""
 
 
 @final
@@ -62,11 +59,12 @@ class Teller:
         now = time.thread_time()
         if iterations <= 1:
             self._since = now
-        self.tell(Doing("solving", now - self._since, self._longest or BUDGET))
+        if self._longest != AT_ONCE:
+            self.tell(Doing("solving", now - self._since, self._longest or BUDGET))
         if self._is_stopped:
             raise StudioError(STOPPED)
         if 0.0 < self._longest < now - self._since:
-            raise _TooLong
+            raise TooLong
 
     def tell(self, doing: Doing) -> None:
         """At once, and then every ``PERIOD``."""
@@ -107,6 +105,7 @@ def serve(pipe: Connection, stop: Event) -> None:
     """
     with suppress(EOFError, KeyboardInterrupt):
         order: Order | None = pipe.recv()
+        from controller.studio.jumping import Jumps
         from controller.studio.making import Maker
         from motions import FeasibilityChecker, Timeline
         from motions.memory import Memory
@@ -114,7 +113,7 @@ def serve(pipe: Connection, stop: Event) -> None:
 
         teller = Teller(pipe, stop)
         checker = FeasibilityChecker(memory=Memory(), progress=teller)  # most of a motion stays
-        maker = Maker()
+        maker, jumps = Maker(), Jumps(checker)
         if order is None:
             _played(checker.evaluate(Timeline().body(z=-0.01, over=0.2)), checker, teller)
         gc.freeze()  # else each search for what is no longer used goes through all of it
@@ -122,12 +121,17 @@ def serve(pipe: Connection, stop: Event) -> None:
         while True:
             if order is not None:
                 teller.begin(order.longest)
-                pipe.send(_answer(order, checker, maker, pipe, teller))
+                pipe.send(_answer(order, checker, jumps, maker, pipe, teller))
             order = pipe.recv()
 
 
 def _answer(
-    order: Order, checker: FeasibilityChecker, maker: Maker, pipe: Connection, teller: Teller
+    order: Order,
+    checker: FeasibilityChecker,
+    jumps: Jumps,
+    maker: Maker,
+    pipe: Connection,
+    teller: Teller,
 ) -> Answer | StudioError:
     from controller.report_view import planned, slider
     from motions import suggest
@@ -148,7 +152,7 @@ def _answer(
             after = split(Source(order.data), str(order.path), made.marks, order.cut)
             end = after.offset(after.site) if after.site else 0
             return Answer(motion.name, split=(after.data, end))
-        checked = checker.evaluate(line)
+        checked = jumps.evaluate(line, order)
         if order.task is Task.PLAY:
             content, told = _played(checked, checker, teller)
         else:
@@ -158,7 +162,7 @@ def _answer(
             pipe.send("failed")
         is_ours = isinstance(error, Go2WbcError)
         return StudioError(str(error) if is_ours else "the file ends the program")
-    except _TooLong:
+    except TooLong:
         return Answer(order.chosen or "", is_solved=False)
     from viz.replay.page_data import prepared
 
