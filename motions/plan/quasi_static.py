@@ -81,8 +81,7 @@ def compile_quasi_static(
     for shift in timeline.in_order(BalanceShift):
         if shift.is_swaying:
             rows = slice(*np.searchsorted(times, [shift.start - SAME, shift.end + SAME]).tolist())
-            length = shift.end - shift.start
-            own = shift.start + np.linspace(0.0, length, len(sample_times(length)))
+            own = shift.start + sample_times(shift.end - shift.start)
             places = footing.at(own)
             trunk = body_path(timeline, home, own, places)
             trunk[:, :2] += followed(own, np.zeros(2), shifts)

@@ -53,13 +53,18 @@ Move = tuple[Key, Float[np.ndarray, " k"]]
 
 
 def sample_times(duration: float) -> Times:
-    """Instants [s] from the start of a motion to its end, which may be off their even steps.
+    """Instants [s] from the start of a motion to its end, in even steps."""
+    return np.linspace(0.0, duration, max(round(duration / SAMPLE_PERIOD), LEAST_STEPS) + 1)
 
-    So what is as in another motion from its start on is sampled as there, whatever their lengths.
+
+def anchored_times(duration: float) -> Times:
+    """Those of ``SAMPLE_PERIOD`` from the start on, and the end, which may be off these steps.
+
+    What is as in another motion up to some instant is sampled as there, whatever their lengths.
     """
-    count = max(round(duration / SAMPLE_PERIOD), LEAST_STEPS)
-    if count == LEAST_STEPS or abs(duration - count * SAMPLE_PERIOD) < SAME:
-        return np.linspace(0.0, duration, count + 1)
+    count = round(duration / SAMPLE_PERIOD)
+    if count <= LEAST_STEPS or abs(duration - count * SAMPLE_PERIOD) < SAME:
+        return sample_times(duration)
     return np.append(SAMPLE_PERIOD * np.arange(count), duration)
 
 

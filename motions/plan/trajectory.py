@@ -24,7 +24,7 @@ from motions import batch_kinematics
 from motions.dynamics.solver import PlanTarget
 from motions.memory import Memory
 from motions.plan.compiled_plan import CompiledPlan, DynamicSpan, PlanSamples
-from motions.plan.tracks import sample_times
+from motions.plan.tracks import anchored_times
 from motions.postures import standing_feet
 
 LEAST_SHARE = 1e-6
@@ -61,7 +61,7 @@ def samples_of(plan: MotionPlan, model: RobotModel) -> PlanSamples:
     Raises:
         MotionError: if the plan is not finite.
     """
-    times = sample_times(plan.duration)
+    times = anchored_times(plan.duration)
     is_compiled = isinstance(plan, CompiledPlan)
     p_feet = standing_feet(model)
     asked = plan.samples(times) if is_compiled else PlanSamples.one_by_one(plan, times, p_feet)

@@ -8,7 +8,7 @@ from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline
 from motions.language.footing import Footing
-from motions.plan.tracks import SAMPLE_PERIOD, Instants, LegTracks, sample_times
+from motions.plan.tracks import SAMPLE_PERIOD, Instants, LegTracks, anchored_times
 from motions.postures import standing_feet
 
 STAND_POSE = find_profile().stand_pose
@@ -18,12 +18,12 @@ FAR = 0.6  # m; ahead of where the foot stands, out of its leg's reach
 
 @pytest.mark.parametrize("duration", [1e-3, 0.01, 0.3, 1.234, 1.2351, 600.004])
 def test_motions_are_sampled_from_their_starts_to_their_ends(duration: float) -> None:
-    times = sample_times(duration)
+    times = anchored_times(duration)
     assert (times[0], times[-1]) == (0.0, duration)
     assert (np.diff(times) > 0.0).all()
     assert np.diff(times).max() <= 1.5 * SAMPLE_PERIOD
     if duration > SAMPLE_PERIOD:  # a longer one has the same instants but for the end
-        longer = sample_times(duration + 5 * SAMPLE_PERIOD)
+        longer = anchored_times(duration + 5 * SAMPLE_PERIOD)
         assert np.allclose(longer[: len(times) - 1], times[:-1], atol=1e-9)
 
 
