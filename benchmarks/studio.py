@@ -7,6 +7,7 @@ software a frame takes longer than all of the rest. Wants an idle machine.
 """
 
 import tempfile
+import time
 from functools import partial
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from tests.viz.replay.browsing import Tab, chromium
 
 EDITS, EDITS_A_DRAG = 200, 20
 LENGTHS = (10, 30, 60)  # [s]
+LEAST_LOAD = 0.05  # s of processor time in a second: less is that of waiting
 REACH = 25  # px to either side of where the end of a bar is taken
 MOVES = (
     ".body(z={z:.3f}, pitch={angle:.3f}, over={over:.2f})",
@@ -91,6 +93,14 @@ def processor_time(process: int) -> float:
     return used + sum(processor_time(int(child)) for child in children.split())
 
 
+def rest(process: int) -> None:
+    """Wait until a process has loaded what it loads meanwhile, which no edit has asked for."""
+    used, now = -np.inf, processor_time(process)
+    while now - used > LEAST_LOAD:
+        time.sleep(1.0)
+        used, now = now, processor_time(process)
+
+
 def measure(trial: Trial, found: TrialResult, seconds: int, kind: str) -> None:
     """Drag the ends of bars of a motion, and wait each time for what comes of it."""
     rng = np.random.default_rng([trial.seed, seconds, 1])
@@ -102,6 +112,7 @@ def measure(trial: Trial, found: TrialResult, seconds: int, kind: str) -> None:
             tab.wait_for("window.studio && replay.version")
             tab.evaluate("studio.tour.end()")
             tab.evaluate(WATCH)
+            rest(opened.process_id)
             before = processor_time(opened.process_id)
             for _ in range(EDITS // EDITS_A_DRAG):
                 drag(tab, rng)

@@ -109,19 +109,22 @@ def serve(pipe: Connection, stop: Event) -> None:
         from controller.studio.making import Maker
         from motions import FeasibilityChecker, Timeline
         from motions.memory import Memory
-        from viz.replay import page_data  # noqa: F401 - takes its time, which no file has to answer for
+        from viz.replay import page_data  # takes its time, which no file has to answer for
 
         teller = Teller(pipe, stop)
         checker = FeasibilityChecker(memory=Memory(), progress=teller)  # most of a motion stays
         maker, jumps = Maker(), Jumps(checker)
         if order is None:
             _played(checker.evaluate(Timeline().body(z=-0.01, over=0.2)), checker, teller)
-        gc.freeze()  # else each search for what is no longer used goes through all of it
         pipe.send("loaded")
         while True:
             if order is not None:
                 teller.begin(order.longest)
-                pipe.send(_answer(order, checker, jumps, maker, pipe, teller))
+                answer = _answer(order, checker, jumps, maker, pipe, teller)
+                pipe.send(answer)
+                if order.task is Task.EXPORT and isinstance(answer, Answer) and answer.content:
+                    page_data.prepared(answer.content)  # no drag has to wait for what that loads
+                    gc.freeze()  # nor each search for what is unused to go through it
             order = pipe.recv()
 
 

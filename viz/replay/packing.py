@@ -12,7 +12,8 @@ import gzip
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import final
+from functools import cache
+from typing import Any, final
 
 import numpy as np
 from jaxtyping import Shaped, UInt8
@@ -47,7 +48,7 @@ class Pack:
     ) -> None:
         """Store an array of one of the types that a browser knows; ``extra`` is told with it."""
         blob = np.ascontiguousarray(array).tobytes()
-        kind = f"{array.dtype.name.capitalize()}Array"  # float32 is a browser's Float32Array
+        kind = _kind(array.dtype)
         start = self._known.setdefault(blob, self._size)
         entry = {"type": kind, "shape": array.shape, "offset": start}
         self._entries[name] = {**entry, **(extra or {})}
@@ -77,6 +78,12 @@ class Pack:
         places = {name: (first + a, first + b) for name, (a, b) in self._places.items()}
         parts = (_length(head), head, padding, *self._blobs)
         return Packed(b"".join(parts), {"": (0, start), **places})
+
+
+@cache
+def _kind(dtype: np.dtype[Any]) -> str:
+    """Of a browser's array: of float32 it is Float32Array."""
+    return f"{dtype.name.capitalize()}Array"
 
 
 def compressed_text(content: bytes) -> str:
