@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import ast
+import io
 import re
+import tokenize
 from bisect import bisect_right
+from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cached_property, lru_cache
 
 from go2_wbc.errors import StudioError
@@ -107,6 +111,16 @@ def syntax_of(data: bytes) -> Syntax:
         StudioError: if it is not Python; says the line.
     """
     return Syntax(data)
+
+
+def lost_comments(before: bytes, after: bytes) -> str:
+    """The comments of a text that another one has not."""
+    found = {before: list[str](), after: list[str]()}
+    for data, comments in found.items():
+        with suppress(tokenize.TokenError):  # it ends in the middle of a statement
+            for token in tokenize.tokenize(io.BytesIO(data).readline):
+                comments += [token.string] if token.type == tokenize.COMMENT else []
+    return "  ".join((Counter(found[before]) - Counter(found[after])).elements())
 
 
 def value_of(node: ast.expr) -> float | str | None:

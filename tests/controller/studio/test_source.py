@@ -286,13 +286,33 @@ def test_the_library_can_be_edited_one_line_at_a_time() -> None:
             "line = (line.hold(0.1)  # one\n    .home(over=1)  # two\n)",
             "line = (line.home(over=1)  # one\n    .hold(0.1)  # two\n)",
         ),
+        (
+            "line = (line\n    .hold(0.1)  # one\n    .home(over=1).body(z=0.0, over=1)\n)",
+            "line = (line\n    .home(over=1)  # one\n    .hold(0.1).body(z=0.0, over=1)\n)",
+        ),
     ],
 )
 def test_no_comment_swallows_a_call_that_is_moved(text: str, after: str) -> None:
     source = Source(text.encode())
-    moved = source.swap((1, text.index(")") + 1), 1)
+    moved = source.swap(source.syntax.site(text.index(")") + 1), 1)
     assert moved.data.decode() == after
     assert moved.text(moved.site or (0, 0)) == ".hold(0.1)"
+
+
+@pytest.mark.parametrize(
+    ("call", "after"),
+    [
+        (".body(z=-0.03, over=(t := 0.6))", ".body(z=-0.03, over=(t := 0.6), x=0.02)"),
+        (".body(over=((0.6)\n),  # )\n)", ".body(over=((0.6)\n), x=0.02,  # )\n)"),
+        (".body()", ".body(x=0.02)"),
+    ],
+)
+def test_an_argument_is_added_behind_the_brackets_of_the_last(call: str, after: str) -> None:
+    text = f"line = Timeline(){call}"
+    source = Source(text.encode())
+    added = source.set(source.syntax.site(len(text)), "x", 0.02)
+    assert added.data.decode() == f"line = Timeline(){after}"
+    assert added.text(added.site or (0, 0)) == after
 
 
 def _inserted(text: str, call: str, code: str, number: int = 0) -> str:
