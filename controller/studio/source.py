@@ -229,9 +229,8 @@ class Source:
         """The value of an argument of this name as text."""
         if name not in ANGLES or isinstance(value, str):
             return written(value)
-        if any(isinstance(node, ast.alias) and node.name == DEGREES for node in self.syntax.nodes):
-            return f"{DEGREES}({written(value)})"
-        return written(math.radians(value))
+        degrees = self.syntax.called(DEGREES)
+        return f"{degrees}({written(value)})" if degrees else written(math.radians(value))
 
     # --- where things are -----------------------------------------------------------------
 
@@ -244,7 +243,7 @@ class Source:
 
     def _receiver(self, call: ast.Call) -> ast.expr:
         if not isinstance(call.func, ast.Attribute):
-            raise StudioError(f"{self._node(call)} is not called on a timeline")
+            raise StudioError(f"{self._node(call)} has a name of its own: change it in the file")
         return call.func.value
 
     def _link(self, call: ast.Call) -> Span:

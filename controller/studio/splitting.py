@@ -36,6 +36,7 @@ WHY_NOT = {
     "posture": "the robot goes to another posture in one move",
     "unweight": "the trunk goes over the other feet in one move",
 }
+TIMES = frozenset({"at", "also", "bpm", "on_beats"})  #: Calls that take no time
 JOINTS = ("hip", "thigh", "calf")
 
 
@@ -98,9 +99,11 @@ def _require_alone(marks: Sequence[CallMark], call: Call, mark: CallMark, time: 
         )
     for other in marks:
         line = other.call.before
-        last = line.keys[-1] if other.call.name == "also" and line and line.keys else None
-        if isinstance(last, CallMark) and last.call is call:
-            raise StudioError("it cannot be split: the move behind it starts with it (also())")
+        if other.call.name == "also" and line is not None:
+            calls = [key.call for key in line.keys if isinstance(key, CallMark)]
+            moves = [one for one in calls if one.name not in TIMES]
+            if moves and moves[-1] is call:
+                raise StudioError("it cannot be split: the move behind it starts with it (also())")
 
 
 def _half(call: Call, share: float) -> _Half:

@@ -14,6 +14,7 @@ from functools import cached_property, lru_cache
 
 from go2_wbc.errors import StudioError
 
+MODULE = "motions"  #: whose functions an author uses
 Site = tuple[int, int]  #: line from 1 and column [bytes] from 0 at which a call ends
 Span = tuple[int, int]  #: first byte, and the first after it
 
@@ -90,12 +91,30 @@ class Syntax:
         return self.data[slice(*span)].decode()
 
     def node(self, node: ast.expr) -> str:
-        """Its text."""
-        return self.text(self.span(node))
+        """Its text; that of a node which stands nowhere (line 0) is made."""
+        return self.text(self.span(node)) if node.lineno else ast.unparse(node)
 
     def name(self, call: ast.Call) -> str:
-        """Of the function or method that is called."""
-        return call.func.attr if isinstance(call.func, ast.Attribute) else self.node(call.func)
+        """Of the function or method that is called, also where it was imported by another."""
+        if isinstance(call.func, ast.Attribute):
+            return call.func.attr
+        own = self.node(call.func)
+        return next((alias.name for _, alias in self._imported if alias.asname == own), own)
+
+    def called(self, name: str) -> str:
+        """What the file calls a function of ``motions``; empty if it has not imported it."""
+        for module, alias in self._imported:
+            if module == MODULE and alias.name in (name, "*"):
+                return alias.asname or name
+            if module is None and alias.name == MODULE:
+                return f"{alias.asname or alias.name}.{name}"
+        return ""
+
+    @cached_property
+    def _imported(self) -> list[tuple[str | None, ast.alias]]:
+        """What is imported, and the module that it is of."""
+        nodes = [one for one in self.tree.body if isinstance(one, ast.Import | ast.ImportFrom)]
+        return [(getattr(node, "module", None), alias) for node in nodes for alias in node.names]
 
     @property
     def line_end(self) -> str:

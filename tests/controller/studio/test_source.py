@@ -315,6 +315,23 @@ def test_an_argument_is_added_behind_the_brackets_of_the_last(call: str, after: 
     assert added.text(added.site or (0, 0)) == after
 
 
+@pytest.mark.parametrize(
+    ("imports", "degrees"),
+    [
+        ("from motions import Timeline as TL, deg as d, motion", "d"),
+        ("import motions as m\nfrom motions import Timeline as TL, motion", "m.deg"),
+        ("from motions import *\nTL = Timeline", "deg"),
+    ],
+)
+def test_degrees_are_called_what_the_file_calls_them(imports: str, degrees: str) -> None:
+    text = f"{imports}\n\n\n@motion\ndef shown():\n    return TL().body(yaw={degrees}(4), over=1.0)"
+    source = Source(text.encode())
+    (slot, _) = source.slots(site := source.syntax.site(len(text)))
+    assert slot.is_angle
+    added = source.set(site, "pitch", 10.0)
+    assert added.data.decode() == f"{text[:-1]}, pitch={degrees}(10.0))"
+
+
 def _inserted(text: str, call: str, code: str, number: int = 0) -> str:
     data = f"from motions import Timeline, motion\n\n\n@motion\ndef greet():\n{text}".encode()
     after = Source(data).insert(_site(data, call, number), code)

@@ -137,7 +137,7 @@ def test_what_runs_beside_another_is_split_once_that_has_ended() -> None:
         ("Timeline().hold(**dict(seconds=1.0))", 0, 0.5, r"what \*\* stands for"),
         ("Timeline().body(z=-0.02, over=0.5).also().body(x=0.02, over=1.0)", 2, 0.4,
          r"runs beside the move before it .also.*behind 0.50 s"),
-        ("Timeline().body(z=-0.02, over=1.0).also().body(x=0.02, over=1.0)", 0, 0.5,
+        ("Timeline().body(z=-0.02, over=1.0).at(2.0).also().body(x=0.02, over=1.0)", 0, 0.5,
          "the move behind it starts with it"),
     ],
 )  # fmt: skip
