@@ -216,8 +216,10 @@ class Source:
         ]
         if len(returns) != 1:
             raise StudioError(f"{motion} returns in {len(returns)} places: append {code} by hand")
-        start, end = self._span(returns[0])
-        if isinstance(returns[0], ast.Call | ast.Name | ast.Attribute):
+        node, (start, end) = returns[0], self._span(returns[0])
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            return Source(self.insert(self.syntax.site(end), code).data)
+        if isinstance(node, ast.Call | ast.Name | ast.Attribute):
             return self.replaced((end, end), code)
         return self.replaced((start, end), f"({self._text((start, end))}){code}")
 

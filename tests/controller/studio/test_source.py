@@ -178,6 +178,16 @@ def test_an_edit_tells_where_its_call_stands_then(op: str) -> None:
 def test_a_change_is_appended_to_what_is_returned() -> None:
     data = Source(FILE).append("greet", ".scale(0.9)").data
     assert data == FILE.replace(b"line.home(over=0.6)\n", b"line.home(over=0.6).scale(0.9)\n")
+    chain = FILE.replace(
+        b"line.home(over=0.6)\n", b"(\n        line\n        .home(over=0.6)\n    )\n"
+    )
+    data = Source(chain).append("greet", ".scale(0.9)").data
+    assert data == chain.replace(
+        b".home(over=0.6)\n    )", b".home(over=0.6)\n        .scale(0.9)\n    )"
+    )
+    wide = FILE.replace(b"return line", b"return line" + b".hold(0.25)" * 6)
+    data = Source(wide).append("greet", ".scale(0.9)").data
+    assert max(map(len, data.splitlines())) <= LONGEST_LINE
     twice = FILE.replace(b"    line = (", b"    if False:\n        return Timeline()\n    line = (")
     with pytest.raises(StudioError, match="returns in 2 places"):
         Source(twice).append("greet", ".scale(0.9)")
