@@ -32,11 +32,18 @@ class Syntax:
         """Read it.
 
         Raises:
-            StudioError: if it is not Python; says the line.
+            StudioError: if it is not Python, or not UTF-8; says the line.
         """
         self.data = data
         try:
+            data.decode()
+            coding, _ = tokenize.detect_encoding(io.BytesIO(data).readline)
+            if not (data.isascii() or coding.startswith("utf-8")):
+                raise StudioError(f"the file says that it is {coding}: save it as UTF-8")
             self.tree = ast.parse(data)
+        except UnicodeDecodeError as error:  # what is kept are places in bytes of UTF-8
+            line = data.count(b"\n", 0, error.start) + 1
+            raise StudioError(f"line {line}: it is no UTF-8: save the file as UTF-8") from error
         except (SyntaxError, ValueError) as error:
             line = f"line {error.lineno}: " if isinstance(error, SyntaxError) else ""
             raise StudioError(f"{line}{error.args[0]}") from error

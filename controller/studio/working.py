@@ -138,12 +138,13 @@ def _answer(
         motion, values, line = made.motion, made.values, made.line
         pipe.send("made")
         has_run = True
+        source = Source(order.data)
         if order.task is Task.MEND:
             found = suggest(line, checker=checker)
             changes = tuple((item.call, item.meaning) for item in found)
             return Answer(motion.name, changes=changes)
         if order.cut is not None:
-            after = split(Source(order.data), str(order.path), made.marks, order.cut)
+            after = split(source, str(order.path), made.marks, order.cut)
             end = after.offset(after.site) if after.site else 0
             return Answer(motion.name, split=(after.data, end))
         checked = checker.evaluate(line)
@@ -162,7 +163,7 @@ def _answer(
 
     sliders = tuple(slider(item, values.get(item.name, item.default)) for item in motion.parameters)
     content = plainly(replace(content, sliders=sliders))
-    bars = tuple(_bars(Source(order.data), str(order.path), made.marks, content))
+    bars = tuple(_bars(source, str(order.path), made.marks, content))
     shown = content if order.task is Task.EXPORT else prepared(content)
     is_solved = not is_unsolved(content)
     return Answer(motion.name, shown, bars, made.names, told, made.notes, is_solved=is_solved)

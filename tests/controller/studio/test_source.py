@@ -342,6 +342,22 @@ def test_degrees_are_called_what_the_file_calls_them(imports: str, degrees: str)
     assert added.data.decode() == f"{text[:-1]}, pitch={degrees}(10.0))"
 
 
+@pytest.mark.parametrize(
+    ("head", "coding", "why"),
+    [
+        ("# -*- coding: latin-1 -*-", "latin-1", "line 2: it is no UTF-8"),
+        ("# -*- coding: latin-1 -*-", "utf-8", "says that it is iso-8859-1"),
+        ("# none", "cp1252", "line 2: it is no UTF-8"),
+    ],
+)
+def test_what_is_not_utf_8_is_not_edited(head: str, coding: str, why: str) -> None:
+    """Python counts in bytes of UTF-8: in another coding a number would go beside its place."""
+    text = f"{head}\nline = Timeline().hold(0.2, name='gr\u00fcn').hold(0.3)\n"
+    with pytest.raises(StudioError, match=why):
+        Source(text.encode(coding))
+    assert Source(text.replace("\u00fc", "ue").encode(coding)).slots((2, 41))
+
+
 def _inserted(text: str, call: str, code: str, number: int = 0) -> str:
     data = f"from motions import Timeline, motion\n\n\n@motion\ndef greet():\n{text}".encode()
     after = Source(data).insert(_site(data, call, number), code)
