@@ -104,7 +104,7 @@ def serve(pipe: Connection, stop: Event) -> None:
     A first order that is ``None`` has it play something before that word: then all of it is loaded.
     What was begun ends where ``stop`` is set.
     """
-    with suppress(EOFError, KeyboardInterrupt):
+    with suppress(EOFError, ConnectionError, KeyboardInterrupt):
         order: Order | None = pipe.recv()
         from controller.studio.making import Maker
         from motions import FeasibilityChecker, Timeline
