@@ -9,16 +9,32 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from controller.studio.expressions import (
+    constant_of,
+    function_of,
+    is_only_of,
+    is_set_to,
+    named,
+    numbers_of,
+    terms,
+    tuple_of,
+    values_of,
+    written_out,
+)
 from controller.studio.syntax import Site, Syntax, value_of
 from go2_wbc.curves import Ease
 from go2_wbc.errors import StudioError
 from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import Posture
 
-RADIANS = frozenset({"deg", "radians"})  #: Functions that take degrees
+RADIANS = frozenset({"deg", "radians", "deg2rad"})  #: Functions that take degrees
+ARRAYS = frozenset(
+    {"array", "asarray", "list", "tuple"}
+)  #: Functions that have what they are given
 MEMBERS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "Posture": tuple(one.name for one in Posture),
@@ -28,6 +44,7 @@ MEMBERS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 """Words that are written as members, such as ``Posture.SIT``."""
 DEEPEST = 6  #: Names of names that are followed
+MOST_NAMES = 100  #: that one argument may lead to: two may stand for each other
 COMPUTED = "it is computed: change it in the file"
 _SCOPES = (ast.FunctionDef, ast.Lambda, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 
@@ -73,15 +90,14 @@ def literals(syntax: Syntax, node: ast.expr, call: ast.AST, run: Run) -> list[Li
 
 
 def resolved(syntax: Syntax, node: ast.expr, call: ast.AST, run: Run) -> ast.expr:
-    """What ``node`` stands for if it is a name of a tuple, a list or a dictionary; else itself."""
-    finder, depth = _Finder(syntax), DEEPEST
-    while isinstance(node, ast.Name) and depth:
-        try:
-            there = finder.bound(node, call, run)
-        except StudioError:
-            return node
-        node, call, run, depth = there.node, there.call, there.run, depth - 1
-    return node
+    """What ``node`` stands for if that is a tuple, a list or a dictionary; else itself."""
+    whole = _Finder(syntax).end_of(node, call, run).node
+    return whole if isinstance(whole, ast.Tuple | ast.List | ast.Dict) else node
+
+
+def elements(syntax: Syntax, node: ast.expr, call: ast.AST, run: Run) -> Sequence[ast.expr]:
+    """What a loop goes through, where that is written out; some of it may stand nowhere."""
+    return _Finder(syntax).parts(node, call, run)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,32 +112,29 @@ class _Bound:
 
 class _Finder:
     def __init__(self, syntax: Syntax) -> None:
-        self._syntax = syntax
+        self._syntax, self._names = syntax, 0
 
     def found(self, node: ast.expr, call: ast.AST, run: Run, depth: int) -> list[Literal]:
         """See ``literals``."""
-        if value_of(node) is not None or _is_member(node):
+        if (value_of(node) is not None and node.lineno) or _is_member(node):
             return [Literal(node)]
-        if isinstance(node, ast.Name):
-            if not depth:
-                raise StudioError(COMPUTED)
-            there = self.bound(node, call, run)
-            place = f"{node.id}, line {there.node.lineno}"
+        there = self.followed(node, call, run) if depth else None
+        if there is not None:
             return [
                 replace(
                     one,
-                    place=place,
+                    place=f"{self._syntax.node(named(node))}, line {one.node.lineno}",
                     depth=one.depth + 1,
                     is_of_loop=one.is_of_loop or there.is_of_loop,
                 )
                 for one in self.found(there.node, there.call, there.run, depth - 1)
             ]
         is_angle = isinstance(node, ast.Call) and self._syntax.name(node) in RADIANS
-        every = [one for part in _terms(node) for one in self._of_part(part, call, run, depth)]
+        every = [one for part in terms(node) for one in self._of_part(node, part, call, run, depth)]
         if not every:
             raise StudioError(COMPUTED)
-        least = min(one.depth for one in every)
-        nearest = [one for one in every if one.depth == 0] if least == 0 else every
+        is_choice = isinstance(node, ast.IfExp)
+        nearest = [one for one in every if one.depth == 0 or is_choice] or every
         where = "" if is_angle else f"in {self._syntax.node(node)}"
         nearest = [
             replace(one, is_angle=one.is_angle or is_angle, place=one.place or where)
@@ -129,16 +142,63 @@ class _Finder:
         ]
         return sorted(nearest, key=lambda one: one.is_of_loop)
 
-    def _of_part(self, part: ast.expr, call: ast.AST, run: Run, depth: int) -> list[Literal]:
+    def _of_part(
+        self, node: ast.expr, part: ast.expr, call: ast.AST, run: Run, depth: int
+    ) -> list[Literal]:
         try:
             every = self.found(part, call, run, depth)
         except StudioError:
             return []
-        return [one for one in every if not isinstance(value_of(one.node), str)]
+        is_choice = isinstance(node, ast.IfExp)
+        return [one for one in every if is_choice or not isinstance(value_of(one.node), str)]
+
+    def followed(self, node: ast.expr, call: ast.AST, run: Run) -> _Bound | None:
+        """What a name, an element, a field, or a value with a name stands for; None for another.
+
+        Raises:
+            StudioError: if that cannot be told; says why.
+        """
+        if isinstance(node, ast.Name):
+            return self.bound(node, call, run)
+        if isinstance(node, ast.NamedExpr):
+            return _Bound(node.value, call, run)
+        if isinstance(node, ast.Subscript):
+            return self._item(node, call, run)
+        if isinstance(node, ast.Attribute):
+            return self._field(node, call, run)
+        return None
+
+    def end_of(self, node: ast.expr, call: ast.AST, run: Run) -> _Bound:
+        """What names, elements and fields lead to."""
+        there = _Bound(node, call, run)
+        with suppress(StudioError):
+            while (further := self.followed(there.node, there.call, there.run)) is not None:
+                there = further
+        return replace(there, node=written_out(there.node))
+
+    def _item(self, node: ast.Subscript, call: ast.AST, run: Run) -> _Bound | None:
+        """An element of a tuple, a list or a dictionary."""
+        there, key = self.end_of(node.value, call, run), self._key(node.slice, call, run)
+        if isinstance(there.node, ast.Dict):
+            for own, value in zip(there.node.keys, there.node.values, strict=True):
+                if own is not None and key is not None and value_of(own) == key:
+                    return replace(there, node=value)
+        parts = self.parts(node.value, call, run)
+        if type(key) is int and -len(parts) <= key < len(parts):
+            return replace(there, node=parts[key])
+        return None
+
+    def _key(self, node: ast.expr, call: ast.AST, run: Run) -> float | str | None:
+        while isinstance(node, ast.Name):
+            there = self.bound(node, call, run)
+            node, call, run = there.node, there.call, there.run
+        return value_of(node)
 
     def bound(self, name: ast.Name, call: ast.AST, run: Run) -> _Bound:
         """What a name stands for: its only value, a parameter's, an element of a loop."""
-        syntax = self._syntax
+        syntax, self._names = self._syntax, self._names + 1
+        if self._names > MOST_NAMES:
+            raise StudioError(COMPUTED)
         functions = [one for one in syntax.around(call) if isinstance(one, ast.FunctionDef)]
         for number, function in enumerate(functions):
             own = run if number == 0 else Run()
@@ -150,8 +210,83 @@ class _Finder:
                 return _only(name.id, found)
         found = self._bindings(syntax.tree, name.id, call, run)
         if not found:
-            raise StudioError(f"{name.id} is not set in this file")
+            raise StudioError(self._why_unknown(name.id, call))
         return replace(_only(name.id, found), call=syntax.tree)
+
+    def _why_unknown(self, name: str, call: ast.AST) -> str:
+        for node in self._syntax.around(call):
+            if isinstance(node, ast.Lambda) and name in [one.arg for one in node.args.args]:
+                return f"{name} is what the lambda in line {node.lineno} is called with"
+            if isinstance(node, ast.match_case):
+                names = [one for one in ast.walk(node.pattern) if isinstance(one, ast.MatchAs)]
+                if name in [one.name for one in names]:
+                    return f"{name} is taken out of what is matched in line {node.pattern.lineno}"
+        return f"{name} is not set in this file"
+
+    def _field(self, node: ast.Attribute, call: ast.AST, run: Run) -> _Bound | None:
+        """What a field of an object or of a class of the file stands for; None of another."""
+        if node.attr == "value" and isinstance(node.value, ast.Attribute):  # of an enumeration
+            return self._field(node.value, call, run)
+        owner = self._owner(node.value, call, run)
+        if owner is None:
+            return None
+        kind = self._class(owner.node)
+        values = [] if kind is None else values_of(kind)
+        if isinstance(owner.node, ast.Call):
+            words = {word.arg: word.value for word in owner.node.keywords}
+            fields = [name for name, _ in values]
+            given = dict(zip(fields, owner.node.args, strict=False)) if kind is not None else {}
+            init = None if kind is None else function_of(kind, "__init__")
+            if init is not None:
+                set_in = [one for one in ast.walk(init) if is_set_to(one, node.attr)]
+                site = self._syntax.site(self._syntax.span(owner.node)[1])
+                inside = Run(0, ((site, owner.run.number), *owner.run.callers))
+                if len(set_in) == 1 and (value := getattr(set_in[0], "value", None)) is not None:
+                    return _Bound(value, set_in[0], inside)
+            elif node.attr in words or node.attr in given:
+                return replace(owner, node=words.get(node.attr) or given[node.attr])
+            elif kind is None and owner.node.args:  # replace(OTHER, ...)
+                other = ast.copy_location(ast.Attribute(owner.node.args[0], node.attr), node)
+                return self._field(other, owner.call, owner.run)
+        value = dict(values).get(node.attr)
+        return None if value is None else _Bound(value, self._syntax.tree, Run())
+
+    def _owner(self, node: ast.expr, call: ast.AST, run: Run) -> _Bound | None:
+        """The call that has made an object, or the name of a class; None where that is unknown."""
+        if isinstance(node, ast.Name):
+            functions = [
+                one for one in self._syntax.around(call) if isinstance(one, ast.FunctionDef)
+            ]
+            own = functions[0].args.args[:1] if functions else []
+            is_method = own and isinstance(self._syntax.parents[functions[0]], ast.ClassDef)
+            if is_method and own[0].arg == node.id:
+                return self._owner_of_self(run)
+            if self._class(node) is not None:
+                return _Bound(node, call, run)
+        if isinstance(node, ast.Call):
+            is_known = self._class(node) is not None or self._syntax.name(node) == "replace"
+            return _Bound(node, call, run) if is_known else None
+        there = self.followed(node, call, run)
+        return None if there is None else self._owner(there.node, there.call, there.run)
+
+    def _owner_of_self(self, run: Run) -> _Bound | None:
+        """What a method was called on, be it in a chain of methods that return it."""
+        if not run.callers:
+            return None
+        (site, number), *others = run.callers
+        outer = self._syntax.call(site)
+        node: ast.expr = outer
+        while isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            node = node.func.value
+        return None if node is outer else self._owner(node, outer, Run(number, tuple(others)))
+
+    def _class(self, node: ast.expr) -> ast.ClassDef | None:
+        """The class of the file that is named, or called."""
+        name = node.func if isinstance(node, ast.Call) else node
+        for one in self._syntax.tree.body:
+            if isinstance(one, ast.ClassDef) and isinstance(name, ast.Name) and one.name == name.id:
+                return one
+        return None
 
     def _parameter(
         self, function: ast.FunctionDef, name: str, call: ast.AST, run: Run
@@ -169,8 +304,10 @@ class _Finder:
         if run.callers:
             (site, number), *others = run.callers
             outer = self._syntax.call(site)
-            if self._syntax.name(outer) == function.name:
-                names = [item.arg for item in every]
+            above, name_of = self._syntax.parents[function], self._syntax.name(outer)
+            is_made = isinstance(above, ast.ClassDef) and name_of == above.name
+            if name_of == function.name or (is_made and function.name == "__init__"):
+                names = [item.arg for item in every][isinstance(above, ast.ClassDef) :]
                 words = dict(zip(names, outer.args, strict=False))
                 words |= {word.arg: word.value for word in outer.keywords if word.arg}
                 if name in words:
@@ -190,7 +327,7 @@ class _Finder:
             value = self._assigned(node, call, run)
             if value is None:
                 raise StudioError(f"{name} is computed in line {node.lineno}")
-            if not _is_only_of(value.node, name):  # what turns round a value is no other one
+            if not is_only_of(value.node, name):  # what turns round a value is no other one
                 found.append(value)
         return found
 
@@ -209,13 +346,13 @@ class _Finder:
         else:
             return None
         for index in path:
-            parts = self._parts(value, call, run)
+            parts = self.parts(value, call, run) if value is not None else []
             value = parts[index] if index < len(parts) else None
         return None if value is None else _Bound(value, call, run, is_of_loop)
 
     def _element(self, loop: ast.For, call: ast.AST, run: Run) -> ast.expr | None:
         """What a loop is at when the call runs."""
-        parts, rounds = self._parts(loop.iter, call, run), 1
+        parts, rounds = self.parts(loop.iter, call, run), 1
         for around in self._syntax.around(call):
             if around is loop:
                 return parts[run.number // rounds % len(parts)] if parts else None
@@ -231,25 +368,37 @@ class _Finder:
         numbers = numbers_of(loop.iter)
         if numbers is not None:
             return len(numbers)
-        return len(self._parts(loop.iter, call, run)) or None
+        return len(self.parts(loop.iter, call, run)) or None
 
-    def _parts(self, node: ast.expr | None, call: ast.AST, run: Run) -> Sequence[ast.expr]:
-        """The elements of a tuple or list that is written out, or has a name; none of another."""
-        if isinstance(node, ast.Name):
-            node = resolved(self._syntax, node, call, run)
-        if isinstance(node, ast.Tuple | ast.List):
-            return [] if any(isinstance(one, ast.Starred) for one in node.elts) else node.elts
+    def parts(self, node: ast.expr, call: ast.AST, run: Run) -> Sequence[ast.expr]:
+        """The elements of what is written out, or has a name; none of another.
+
+        Those of ``zip``, ``enumerate`` and ``items`` are made here, and stand nowhere.
+        """
+        whole = self.end_of(node, call, run).node
+        if isinstance(whole, ast.Dict):
+            return [] if None in whole.keys else [key for key in whole.keys if key is not None]
+        if isinstance(whole, ast.Tuple | ast.List):
+            return [] if any(isinstance(one, ast.Starred) for one in whole.elts) else whole.elts
+        if not isinstance(whole, ast.Call):
+            return []
+        name, given = self._syntax.name(whole), whole.args
+        if name in ("items", "values") and isinstance(whole.func, ast.Attribute):
+            items = self.end_of(whole.func.value, call, run).node
+            if not isinstance(items, ast.Dict) or None in items.keys:
+                return []
+            pairs = zip(items.keys, items.values, strict=True)
+            return items.values if name == "values" else [tuple_of(*pair) for pair in pairs]
+        rows = [self.parts(one, call, run) for one in given]
+        if name == "zip":
+            return [tuple_of(*row) for row in zip(*rows, strict=False)]
+        if name == "enumerate" and len(rows) == 1 and not whole.keywords:
+            return [tuple_of(constant_of(k), one) for k, one in enumerate(rows[0])]
+        if name == "reversed" and rows:
+            return rows[0][::-1]
+        if name in RADIANS and rows:
+            return [ast.Call(whole.func, [one], [], lineno=0, col_offset=0) for one in rows[0]]
         return []
-
-
-def numbers_of(node: ast.expr) -> range | None:
-    """The numbers of ``range(...)`` with literals."""
-    if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name)):
-        return None
-    values = [value_of(one) for one in node.args]
-    if node.func.id != "range" or not values or not all(type(value) is int for value in values):
-        return None
-    return range(*values)  # type: ignore[arg-type]
 
 
 def _only(name: str, found: Sequence[_Bound]) -> _Bound:
@@ -258,31 +407,12 @@ def _only(name: str, found: Sequence[_Bound]) -> _Bound:
     return found[0]
 
 
-def _terms(node: ast.expr) -> list[ast.expr]:
-    """What an expression is made of."""
-    if isinstance(node, ast.UnaryOp):
-        return [node.operand]
-    if isinstance(node, ast.BinOp):
-        return [node.left, node.right]
-    if isinstance(node, ast.IfExp):
-        return [node.body, node.orelse]
-    if isinstance(node, ast.Call):
-        return [*node.args, *(word.value for word in node.keywords)]
-    return []
-
-
 def _is_member(node: ast.expr) -> bool:
     return (
         isinstance(node, ast.Attribute)
         and isinstance(node.value, ast.Name)
         and node.attr in MEMBERS.get(node.value.id, ())
     )
-
-
-def _is_only_of(node: ast.expr, name: str) -> bool:
-    """Whether an expression has no value of its own, but turns round that of ``name``."""
-    names = {one.id for one in ast.walk(node) if isinstance(one, ast.Name)}
-    return names == {name} and not isinstance(node, ast.Name)
 
 
 def _within(scope: ast.AST) -> Iterator[ast.AST]:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping, Sequence
 
-from controller.studio.literals import Run, numbers_of, resolved
+from controller.studio.expressions import numbers_of
+from controller.studio.literals import Run, elements
 from controller.studio.source import Slot, Source
 from controller.studio.syntax import Site, Span, Syntax
 from go2_wbc.errors import StudioError
@@ -50,11 +51,11 @@ def _rounds(syntax: Syntax, loop: ast.For, call: ast.AST, run: Run) -> list[list
     if numbers is not None:
         rows = [[str(number)] for number in numbers]
     else:
-        whole = resolved(syntax, loop.iter, call, run)
-        if not isinstance(whole, ast.Tuple | ast.List):
+        parts = elements(syntax, loop.iter, call, run)
+        if not parts:
             code = syntax.node(loop.iter)
             raise StudioError(f"it goes round as {code} says: written out, it would not follow it")
-        rows = [_texts(syntax, loop.target, element) for element in whole.elts]
+        rows = [_texts(syntax, loop.target, one) for one in parts]
     if not 0 < len(rows) <= MOST_ROUNDS:
         raise StudioError(f"it goes round {len(rows)} times")
     return rows

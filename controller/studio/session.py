@@ -82,6 +82,7 @@ class Studio:
         self._doing = dict[str, Doing]()
         self._runner, self._player = Runner(), Runner()
         self._is_solved = self._is_looking = True  # all that jumps in what is saved; for what does
+        self._is_away = False  # the file, when it was looked at last
         self._changes: tuple[str, ...] = ()
         self._copied: tuple[str, ...] = ()
         self._motions: tuple[str, ...] = ()
@@ -346,11 +347,14 @@ class Studio:
         """Show what somebody else has saved, once it rests; whether anything is new."""
         with self._lock:
             try:
-                if not self._project.refresh(must_rest=True):
-                    return False
+                is_new = self._project.refresh(must_rest=True)
             except StudioError as error:
+                self._is_away = True
                 self._server.publish_error(str(error))
                 return False
+            if not is_new and not self._is_away:
+                return False
+            self._is_away = False
             self.show()
             return True
 

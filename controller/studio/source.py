@@ -144,12 +144,16 @@ class Source:
         if any(isinstance(node, ast.Starred) for node in call.args):
             raise StudioError(f"{self._name(call)}() is called with what a * stands for")
         takes = parameters(self._name(call))
-        found = [(n, self._node(one), False) for n, one in zip(takes, call.args, strict=False)]
+        found = [(n, self._whole(one), False) for n, one in zip(takes, call.args, strict=False)]
         for word in call.keywords:
             if word.arg is None:
                 raise StudioError(f"{self._name(call)}() is called with what ** stands for")
-            found.append((word.arg, self._node(word.value), True))
+            found.append((word.arg, self._whole(word.value), True))
         return found
+
+    def _whole(self, node: ast.expr) -> str:
+        """Its text, with the brackets that it needs."""
+        return f"({self._node(node)})" if isinstance(node, ast.NamedExpr) else self._node(node)
 
     def offset(self, site: Site) -> int:
         """The first byte behind a call."""
@@ -171,9 +175,10 @@ class Source:
             where = "first" if step < 0 else "last"
             raise StudioError(f"{self._name(call)}() is the {where} call of its chain")
         links = sorted([self._link(call), self._link(other)])
-        if all(self._text(link)[0] in "\r\n" for link in links):  # their comments go with them
-            first, second = ((start, tail(self.data, end)) for start, end in links)
-        else:  # a comment would swallow what came behind it: layout and comments stay
+        first, second = ((start, tail(self.data, end)) for start, end in links)
+        is_last = self.data[second[1] : second[1] + 1] in (b"", b"\r", b"\n")  # of its line
+        if not is_last or any(self._text(link)[0] not in "\r\n" for link in links):
+            # a comment would swallow what came behind it: layout and comments stay
             first, second = links = [(self._dot(start), end) for start, end in links]
         middle = self._text((first[1], second[0]))
         (_, one), (_, other_end) = links
@@ -182,6 +187,19 @@ class Source:
         return self.replaced(
             (first[0], second[1]), self._text(second) + middle + self._text(first), moved
         )
+
+    def noted(self, comment: str) -> Source:
+        """With a comment in the line where the call of ``site`` ends, if that may have one."""
+        if self.site is None or not comment:
+            return self
+        line = re.compile(rb"[^\r\n]*").match(self.data, self.syntax.starts[self.site[0] - 1])
+        end, at = line.end() if line else 0, self.offset(self.site)
+        try:
+            noted = self.replaced((end, end), f"  {comment}", at)
+        except StudioError:  # behind a backslash
+            return self
+        is_same = ast.dump(noted.syntax.tree) == ast.dump(self.syntax.tree)
+        return noted if is_same else self  # in a text it would be a part of it
 
     def append(self, motion: str, code: str) -> Source:
         """With ``code``, such as ``.scale_time(1.2)``, behind what a motion returns.
@@ -198,8 +216,10 @@ class Source:
         ]
         if len(returns) != 1:
             raise StudioError(f"{motion} returns in {len(returns)} places: append {code} by hand")
-        start, end = self._span(returns[0])
-        if isinstance(returns[0], ast.Call | ast.Name | ast.Attribute):
+        node, (start, end) = returns[0], self._span(returns[0])
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            return Source(self.insert(self.syntax.site(end), code).data)
+        if isinstance(node, ast.Call | ast.Name | ast.Attribute):
             return self.replaced((end, end), code)
         return self.replaced((start, end), f"({self._text((start, end))}){code}")
 
@@ -211,9 +231,8 @@ class Source:
         """The value of an argument of this name as text."""
         if name not in ANGLES or isinstance(value, str):
             return written(value)
-        if any(isinstance(node, ast.alias) and node.name == DEGREES for node in self.syntax.nodes):
-            return f"{DEGREES}({written(value)})"
-        return written(math.radians(value))
+        degrees = self.syntax.called(DEGREES)
+        return f"{degrees}({written(value)})" if degrees else written(math.radians(value))
 
     # --- where things are -----------------------------------------------------------------
 
@@ -226,7 +245,7 @@ class Source:
 
     def _receiver(self, call: ast.Call) -> ast.expr:
         if not isinstance(call.func, ast.Attribute):
-            raise StudioError(f"{self._node(call)} is not called on a timeline")
+            raise StudioError(f"{self._node(call)} has a name of its own: change it in the file")
         return call.func.value
 
     def _link(self, call: ast.Call) -> Span:
@@ -336,8 +355,10 @@ class Source:
         given = [*call.args, *(word.value for word in call.keywords)]
         at = max([self._span(node)[1] for node in given], default=0)
         text = f", {self.argument(name, value)}" if at else self.argument(name, value)
-        at = at or self.data.index(b"(", self._name_start(call)) + 1
-        return self.replaced((at, at), text, self._span(call)[1] + len(text.encode()))
+        end = self._span(call)[1]
+        own = re.compile(rb"(\s*\))*").match(self.data, at, end - 1)  # brackets round the last one
+        at = own.end() if at and own else self.data.index(b"(", self._name_start(call)) + 1
+        return self.replaced((at, at), text, end + len(text.encode()))
 
 
 def first_parameters(name: str) -> list[str]:

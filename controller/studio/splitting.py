@@ -13,6 +13,7 @@ from typing import Any
 from controller.studio.literals import Run
 from controller.studio.orders import Cut
 from controller.studio.source import ANGLES, Source
+from controller.studio.syntax import lost_comments
 from go2_wbc.errors import StudioError
 from go2_wbc.legs import Leg
 from motions import Timeline
@@ -35,6 +36,7 @@ WHY_NOT = {
     "posture": "the robot goes to another posture in one move",
     "unweight": "the trunk goes over the other feet in one move",
 }
+TIMES = frozenset({"at", "also", "bpm", "on_beats"})  #: Calls that take no time
 JOINTS = ("hip", "thigh", "calf")
 
 
@@ -57,6 +59,7 @@ def split(source: Source, path: str, marks: Sequence[CallMark], cut: Cut) -> Sou
     if mark is None:
         raise StudioError("what is split must be written in this file")
     call = mark.call
+    source.arguments(cut.site)  # each of them is written
     how_long = "seconds" if call.name == "hold" else "over"
     length = call.arguments.get(how_long)
     if call.name != "hold" and call.name not in {*TRUNK, *FEET, *WAYS}:
@@ -67,6 +70,7 @@ def split(source: Source, path: str, marks: Sequence[CallMark], cut: Cut) -> Sou
     if not isinstance(length, int | float):
         raise StudioError("it takes as long as its steps need: add the argument Takes first")
     start = mark.start if call.name in WAYS else mark.move  # a shift before it is not of its time
+    _require_alone(marks, call, mark, cut.time)
     is_shift = mark.start < cut.time < start
     shift = "; while the trunk shifts (hatched) there is nothing to split" if is_shift else ""
     share = (cut.time - start) / max(mark.end - start, LEAST)
@@ -83,6 +87,23 @@ def split(source: Source, path: str, marks: Sequence[CallMark], cut: Cut) -> Sou
         if name in call.arguments
     }
     return _written(source, cut, shared, _half(call, share))
+
+
+def _require_alone(marks: Sequence[CallMark], call: Call, mark: CallMark, time: float) -> None:
+    """Raise StudioError where ``also()`` is before or behind, which counts from one call."""
+    before = call.before
+    if before is not None and time < mark.start + (wait := before.floor - before.cursor):
+        raise StudioError(
+            f"it runs beside the move before it (also()): to split it, put the playhead behind "
+            f"{mark.start + wait:.2f} s, where that one ends"
+        )
+    for other in marks:
+        line = other.call.before
+        if other.call.name == "also" and line is not None:
+            calls = [key.call for key in line.keys if isinstance(key, CallMark)]
+            moves = [one for one in calls if one.name not in TIMES]
+            if moves and moves[-1] is call:
+                raise StudioError("it cannot be split: the move behind it starts with it (also())")
 
 
 def _half(call: Call, share: float) -> _Half:
@@ -162,7 +183,8 @@ def _written(
         first.append(f"{of}={one}" if is_word else one)
     first[at:at] = [f"{of}={_number(source, of, value)}" for of, value in left.items() if value]
     texts = f".{half.name}({', '.join(first)})", f".{name}({', '.join(second)})"
-    return source.parted(cut.site, *texts)
+    parted = source.parted(cut.site, *texts)
+    return parted.noted(lost_comments(source.data, parted.data))
 
 
 def _number(source: Source, name: str, value: float) -> str:

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import ast
+import io
 import re
+import tokenize
 from bisect import bisect_right
+from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cached_property, lru_cache
 
 from go2_wbc.errors import StudioError
 
+MODULE = "motions"  #: whose functions an author uses
 Site = tuple[int, int]  #: line from 1 and column [bytes] from 0 at which a call ends
 Span = tuple[int, int]  #: first byte, and the first after it
 
@@ -27,11 +32,18 @@ class Syntax:
         """Read it.
 
         Raises:
-            StudioError: if it is not Python; says the line.
+            StudioError: if it is not Python, or not UTF-8; says the line.
         """
         self.data = data
         try:
+            data.decode()
+            coding, _ = tokenize.detect_encoding(io.BytesIO(data).readline)
+            if not (data.isascii() or coding.startswith("utf-8")):
+                raise StudioError(f"the file says that it is {coding}: save it as UTF-8")
             self.tree = ast.parse(data)
+        except UnicodeDecodeError as error:  # what is kept are places in bytes of UTF-8
+            line = data.count(b"\n", 0, error.start) + 1
+            raise StudioError(f"line {line}: it is no UTF-8: save the file as UTF-8") from error
         except (SyntaxError, ValueError) as error:
             line = f"line {error.lineno}: " if isinstance(error, SyntaxError) else ""
             raise StudioError(f"{line}{error.args[0]}") from error
@@ -86,12 +98,30 @@ class Syntax:
         return self.data[slice(*span)].decode()
 
     def node(self, node: ast.expr) -> str:
-        """Its text."""
-        return self.text(self.span(node))
+        """Its text; that of a node which stands nowhere (line 0) is made."""
+        return self.text(self.span(node)) if node.lineno else ast.unparse(node)
 
     def name(self, call: ast.Call) -> str:
-        """Of the function or method that is called."""
-        return call.func.attr if isinstance(call.func, ast.Attribute) else self.node(call.func)
+        """Of the function or method that is called, also where it was imported by another."""
+        if isinstance(call.func, ast.Attribute):
+            return call.func.attr
+        own = self.node(call.func)
+        return next((alias.name for _, alias in self._imported if alias.asname == own), own)
+
+    def called(self, name: str) -> str:
+        """What the file calls a function of ``motions``; empty if it has not imported it."""
+        for module, alias in self._imported:
+            if module == MODULE and alias.name in (name, "*"):
+                return alias.asname or name
+            if module is None and alias.name == MODULE:
+                return f"{alias.asname or alias.name}.{name}"
+        return ""
+
+    @cached_property
+    def _imported(self) -> list[tuple[str | None, ast.alias]]:
+        """What is imported, and the module that it is of."""
+        nodes = [one for one in self.tree.body if isinstance(one, ast.Import | ast.ImportFrom)]
+        return [(getattr(node, "module", None), alias) for node in nodes for alias in node.names]
 
     @property
     def line_end(self) -> str:
@@ -107,6 +137,16 @@ def syntax_of(data: bytes) -> Syntax:
         StudioError: if it is not Python; says the line.
     """
     return Syntax(data)
+
+
+def lost_comments(before: bytes, after: bytes) -> str:
+    """The comments of a text that another one has not."""
+    found = {before: list[str](), after: list[str]()}
+    for data, comments in found.items():
+        with suppress(tokenize.TokenError):  # it ends in the middle of a statement
+            for token in tokenize.tokenize(io.BytesIO(data).readline):
+                comments += [token.string] if token.type == tokenize.COMMENT else []
+    return "  ".join((Counter(found[before]) - Counter(found[after])).elements())
 
 
 def value_of(node: ast.expr) -> float | str | None:

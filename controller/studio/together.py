@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 
 from controller.studio.source import Source
-from controller.studio.syntax import Site
+from controller.studio.syntax import Site, lost_comments
 from go2_wbc.errors import StudioError
 
 MOST = 1000  #: Calls that one order may concern
@@ -72,15 +72,18 @@ def _moved(source: Source, order: Mapping[str, object], edit: Edit) -> Source:
     if len(sites) == 1 and order.get("step") in (-1, 1):
         with suppress(StudioError):
             return edit(source, {**order, "op": "swap", "site": list(sites[0])})
-    texts = copied(source, order)
+    texts, lost = copied(source, order), list[str]()
     end = source.offset(target)
-    for site in reversed(sites):
+    for site, text in zip(reversed(sites), reversed(texts), strict=True):
         after = source.delete(site)
+        lost.insert(0, lost_comments(source.data, after.data + text.encode()))
         if site < target:
             end -= len(source.data) - len(after.data)
         source = after
     target = source.syntax.site(end)
-    source = pasted(source, {"site": list(target)}, texts)
+    for text, comment in zip(texts, lost, strict=True):
+        source = source.insert(target, text).noted(comment)
+        target = source.site or target
     if order.get("is_ahead") is True:
         if len(texts) > 1:
             raise StudioError("one at a time before the first move of all")

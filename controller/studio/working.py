@@ -103,7 +103,7 @@ def serve(pipe: Connection, stop: Event) -> None:
     A first order that is ``None`` has it play something before that word: then all of it is loaded.
     What was begun ends where ``stop`` is set.
     """
-    with suppress(EOFError, KeyboardInterrupt):
+    with suppress(EOFError, ConnectionError, KeyboardInterrupt):
         order: Order | None = pipe.recv()
         from controller.studio.jumping import Jumps
         from controller.studio.making import Maker
@@ -147,12 +147,13 @@ def _answer(
         motion, values, line = made.motion, made.values, made.line
         pipe.send("made")
         has_run = True
+        source = Source(order.data)
         if order.task is Task.MEND:
             found = suggest(line, checker=checker)
             changes = tuple((item.call, item.meaning) for item in found)
             return Answer(motion.name, changes=changes)
         if order.cut is not None:
-            after = split(Source(order.data), str(order.path), made.marks, order.cut)
+            after = split(source, str(order.path), made.marks, order.cut)
             end = after.offset(after.site) if after.site else 0
             return Answer(motion.name, split=(after.data, end))
         checked = jumps.evaluate(line, order)
@@ -171,7 +172,7 @@ def _answer(
 
     sliders = tuple(slider(item, values.get(item.name, item.default)) for item in motion.parameters)
     content = plainly(replace(content, sliders=sliders))
-    bars = tuple(_bars(order, made.marks, content))
+    bars = tuple(_bars(order, source, made.marks, content))
     shown = content if order.task is Task.EXPORT else prepared(content)
     is_solved = not is_unsolved(content)
     return Answer(motion.name, shown, bars, made.names, told, made.notes, is_solved=is_solved)
@@ -203,7 +204,9 @@ def _played(
     return content, f"played in MuJoCo: done, {share}" if result.ok else f"NOT done: {why}"
 
 
-def _bars(order: Order, marks: Sequence[CallMark], content: ReplayContent) -> Iterator[Bar]:
+def _bars(
+    order: Order, source: Source, marks: Sequence[CallMark], content: ReplayContent
+) -> Iterator[Bar]:
     runs = Counter((mark.call.file, mark.call.site) for mark in marks)
     is_draft = order.task is Task.DRAFT
     for mark in marks:
@@ -212,10 +215,10 @@ def _bars(order: Order, marks: Sequence[CallMark], content: ReplayContent) -> It
         parts = tuple(part if isinstance(part, str) else part.name for part in mark.parts)
         values = dict(_values(call.arguments))
         if is_here and "others" in call.arguments:  # which have no name but what is written
-            values["others"] = Source(order.data).text(call.site).partition("(")[2][:-1]
+            values["others"] = source.text(call.site).partition("(")[2][:-1]
         slots = list[Slot]()
         if is_here and not is_draft:
-            slots = Source(order.data).slots(call.site, Run(call.number, call.callers))
+            slots = source.slots(call.site, Run(call.number, call.callers))
         yield Bar(
             call.name,
             call.site if is_here else (0, 0),

@@ -277,8 +277,10 @@ class BodyAndFeet(TimelineData):
         raised = self.raised | {arguments.foot(leg)}
         return self._longer([BalanceShift(start, end, Ease.MINIMUM_JERK, raised)], end)
 
-    def down(self, leg: Leg | str, *, over: float) -> Self:
-        """Put a raised foot back where it stood.
+    def down(self, leg: Leg | str, *, over: float, ease: EaseWord = Ease.MINIMUM_JERK) -> Self:
+        """Put a raised foot back where it stood; with ``ease="in"`` it touches at the end.
+
+        One that comes to rest on the ground touches it earlier, as the trunk is some mm too low.
 
         Raises:
             TimelineError: if the foot is not raised.
@@ -286,7 +288,7 @@ class BodyAndFeet(TimelineData):
         which = arguments.foot(leg)
         if which not in self.raised:
             raise TimelineError(f"down(): foot {which.name} is not raised")
-        return self._move_leg(which, ON_GROUND, over, Ease.MINIMUM_JERK)
+        return self._move_leg(which, ON_GROUND, over, ease)
 
     def home(self, *, over: float) -> Self:
         """Put every raised foot down, then bring the trunk back to its posture."""

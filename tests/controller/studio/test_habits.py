@@ -1,4 +1,4 @@
-"""Files in twenty habits are edited in place: what is said to be editable is, and nothing else."""
+"""Files in many habits are edited in place: what is said to be editable is, and nothing else."""
 
 from __future__ import annotations
 
@@ -41,10 +41,6 @@ def _given(mark: CallMark, slot: Slot) -> str:
     return repr(plain(mark.call.arguments.get(slot.of)))
 
 
-def test_there_are_twenty() -> None:
-    assert len(FILES) == 20
-
-
 def test_most_bars_can_be_edited_in_every_argument_and_the_others_say_why() -> None:
     bars = editable = 0
     for data in FILES.values():
@@ -52,7 +48,7 @@ def test_most_bars_can_be_edited_in_every_argument_and_the_others_say_why() -> N
             slots = slots_of(data, mark)
             bars, editable = bars + 1, editable + all(slot.span is not None for slot in slots)
             assert all(slot.why for slot in slots if slot.span is None)
-    assert bars > 90
+    assert bars > 140
     assert editable / bars >= EDITABLE
 
 
@@ -76,6 +72,6 @@ def test_an_edit_touches_its_span_and_moves_what_it_says(habit: str) -> None:
                 again = marks_of(after)
             except TimelineError:
                 continue  # the language says no: it is not written then
-            if slot.value and "*" not in slot.code:
+            if slot.value and "*" not in slot.code and " if " not in slot.code:
                 assert _given(again[index], slot) != _given(mark, slot), (slot, mark.call)
     assert edits

@@ -50,7 +50,7 @@ def test_what_is_written_out_is_the_same_motion(habit: str) -> None:
         except StudioError:
             continue
         assert motion_of(after)().keys == line.keys, after.decode()
-        assert after.startswith(data[: data.index(b"@motion")])
+        assert after.startswith(data[: data.index(b"for ")])
         again = traced_of(after)[1]
         assert len({(one.call.site, one.call.number) for one in again}) == len(again)
         sites = len({one.call.site for one in again})
@@ -120,6 +120,8 @@ def test_a_parameter_is_the_same_motion_and_moves_it(habit: str) -> None:
             new = motion.parameters[-1]
             assert new.default == slot.value
             assert isinstance(new.valid, Range)
+            if " if " in slot.code:  # of a choice it may be the other value
+                continue
             try:
                 other = motion(**{new.name: new.valid.high})
             except TimelineError:  # the language says no to this number

@@ -189,6 +189,10 @@ def test_a_file_that_is_away_is_told(studio: Studio, file: Path) -> None:
     assert "cannot read greet.py" in str(studio._server._error)
     assert "cannot read" in _edit(studio, 0, op="delete")["error"]
     assert not file.exists()
+    file.write_text(GREET, encoding="utf-8")  # as it was: nothing is new, but it is there
+    assert _look(studio)
+    assert studio._server._error is None
+    assert not _look(studio)
 
 
 def test_a_chosen_parameter_is_no_edit(studio: Studio, file: Path) -> None:

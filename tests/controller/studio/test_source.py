@@ -178,6 +178,16 @@ def test_an_edit_tells_where_its_call_stands_then(op: str) -> None:
 def test_a_change_is_appended_to_what_is_returned() -> None:
     data = Source(FILE).append("greet", ".scale(0.9)").data
     assert data == FILE.replace(b"line.home(over=0.6)\n", b"line.home(over=0.6).scale(0.9)\n")
+    chain = FILE.replace(
+        b"line.home(over=0.6)\n", b"(\n        line\n        .home(over=0.6)\n    )\n"
+    )
+    data = Source(chain).append("greet", ".scale(0.9)").data
+    assert data == chain.replace(
+        b".home(over=0.6)\n    )", b".home(over=0.6)\n        .scale(0.9)\n    )"
+    )
+    wide = FILE.replace(b"return line", b"return line" + b".hold(0.25)" * 6)
+    data = Source(wide).append("greet", ".scale(0.9)").data
+    assert max(map(len, data.splitlines())) <= LONGEST_LINE
     twice = FILE.replace(b"    line = (", b"    if False:\n        return Timeline()\n    line = (")
     with pytest.raises(StudioError, match="returns in 2 places"):
         Source(twice).append("greet", ".scale(0.9)")
@@ -286,13 +296,66 @@ def test_the_library_can_be_edited_one_line_at_a_time() -> None:
             "line = (line.hold(0.1)  # one\n    .home(over=1)  # two\n)",
             "line = (line.home(over=1)  # one\n    .hold(0.1)  # two\n)",
         ),
+        (
+            "line = (line\n    .hold(0.1)  # one\n    .home(over=1).body(z=0.0, over=1)\n)",
+            "line = (line\n    .home(over=1)  # one\n    .hold(0.1).body(z=0.0, over=1)\n)",
+        ),
     ],
 )
 def test_no_comment_swallows_a_call_that_is_moved(text: str, after: str) -> None:
     source = Source(text.encode())
-    moved = source.swap((1, text.index(")") + 1), 1)
+    moved = source.swap(source.syntax.site(text.index(")") + 1), 1)
     assert moved.data.decode() == after
     assert moved.text(moved.site or (0, 0)) == ".hold(0.1)"
+
+
+@pytest.mark.parametrize(
+    ("call", "after"),
+    [
+        (".body(z=-0.03, over=(t := 0.6))", ".body(z=-0.03, over=(t := 0.6), x=0.02)"),
+        (".body(over=((0.6)\n),  # )\n)", ".body(over=((0.6)\n), x=0.02,  # )\n)"),
+        (".body()", ".body(x=0.02)"),
+    ],
+)
+def test_an_argument_is_added_behind_the_brackets_of_the_last(call: str, after: str) -> None:
+    text = f"line = Timeline(){call}"
+    source = Source(text.encode())
+    added = source.set(source.syntax.site(len(text)), "x", 0.02)
+    assert added.data.decode() == f"line = Timeline(){after}"
+    assert added.text(added.site or (0, 0)) == after
+
+
+@pytest.mark.parametrize(
+    ("imports", "degrees"),
+    [
+        ("from motions import Timeline as TL, deg as d, motion", "d"),
+        ("import motions as m\nfrom motions import Timeline as TL, motion", "m.deg"),
+        ("from motions import *\nTL = Timeline", "deg"),
+    ],
+)
+def test_degrees_are_called_what_the_file_calls_them(imports: str, degrees: str) -> None:
+    text = f"{imports}\n\n\n@motion\ndef shown():\n    return TL().body(yaw={degrees}(4), over=1.0)"
+    source = Source(text.encode())
+    (slot, _) = source.slots(site := source.syntax.site(len(text)))
+    assert slot.is_angle
+    added = source.set(site, "pitch", 10.0)
+    assert added.data.decode() == f"{text[:-1]}, pitch={degrees}(10.0))"
+
+
+@pytest.mark.parametrize(
+    ("head", "coding", "why"),
+    [
+        ("# -*- coding: latin-1 -*-", "latin-1", "line 2: it is no UTF-8"),
+        ("# -*- coding: latin-1 -*-", "utf-8", "says that it is iso-8859-1"),
+        ("# none", "cp1252", "line 2: it is no UTF-8"),
+    ],
+)
+def test_what_is_not_utf_8_is_not_edited(head: str, coding: str, why: str) -> None:
+    """Python counts in bytes of UTF-8: in another coding a number would go beside its place."""
+    text = f"{head}\nline = Timeline().hold(0.2, name='gr\u00fcn').hold(0.3)\n"
+    with pytest.raises(StudioError, match=why):
+        Source(text.encode(coding))
+    assert Source(text.replace("\u00fc", "ue").encode(coding)).slots((2, 41))
 
 
 def _inserted(text: str, call: str, code: str, number: int = 0) -> str:

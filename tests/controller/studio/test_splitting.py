@@ -106,6 +106,21 @@ def test_only_the_call_is_touched_and_its_layout_kept() -> None:
     assert after.site == (13, 18)
 
 
+def test_comments_between_arguments_and_brackets_stay() -> None:
+    body = "Timeline().body(  # both\n        z=-0.02,  # down\n        over=(t := 1.0)).hold(t)"
+    before, source = _split(body, 0, 0.5)
+    first, second = (f".body(z={z}, over=0.5 * (t := 1.0))" for z in (-0.01, -0.02))
+    lines = f"{first}\n        {second}.hold(t)  # both  # down\n"
+    assert lines in source.data.decode()
+    assert _made(source.data)[0].end == _made(before)[0].end
+
+
+def test_what_runs_beside_another_is_split_once_that_has_ended() -> None:
+    body = "Timeline().body(z=-0.02, over=0.5).also().body(x=0.02, over=1.0).hold(0.5)"
+    before, source = _split(body, 2, 0.6)
+    assert _made(source.data)[0].end == _made(before)[0].end
+
+
 @pytest.mark.parametrize(
     ("body", "number", "time", "why"),
     [
@@ -118,6 +133,12 @@ def test_only_the_call_is_touched_and_its_layout_kept() -> None:
         ('Timeline().foot("FR", z=0.05, over=0.5, frame="body")', 0, 1.1, "with the ground before"),
         ("Timeline().home(over=0.5)", 0, 0.2, "nothing to split"),
         ("Timeline().body(**{'z': -0.02}, over=1.0)", 0, 0.5, r"what \*\* stands for"),
+        ("Timeline().body(z=-0.02, **{'over': 1.0})", 0, 0.5, r"what \*\* stands for"),
+        ("Timeline().hold(**dict(seconds=1.0))", 0, 0.5, r"what \*\* stands for"),
+        ("Timeline().body(z=-0.02, over=0.5).also().body(x=0.02, over=1.0)", 2, 0.4,
+         r"runs beside the move before it .also.*behind 0.50 s"),
+        ("Timeline().body(z=-0.02, over=1.0).at(2.0).also().body(x=0.02, over=1.0)", 0, 0.5,
+         "the move behind it starts with it"),
     ],
 )  # fmt: skip
 def test_where_it_cannot_be_done_it_says_why(body: str, number: int, time: float, why: str) -> None:

@@ -94,6 +94,33 @@ def test_one_call_goes_before_the_first_of_all() -> None:
         _move(["foot", "hold"], "body", is_ahead=True)
 
 
+@pytest.mark.parametrize(
+    ("names", "target", "line"),
+    [
+        (
+            ["hold"],
+            "foot",
+            '    line = line.foot("FR", z=0.1, over=0.5).hold(0.4).down("FR", over=0.5)  # low',
+        ),
+        (["hold"], "pose", "        .hold(0.4)  # low"),
+        (["hold"], "home", "    return line.home(over=0.6).hold(0.4)  # low"),
+    ],
+)
+def test_a_call_takes_its_comment_along(names: Sequence[str], target: str, line: str) -> None:
+    after = _move(names, target)
+    assert line in after.data.decode().splitlines(), after.data.decode()
+    assert _name_at(after, after.site) == f".{names[-1]}"
+
+
+def test_a_comment_is_left_out_where_none_may_stand() -> None:
+    text = LINE.replace("z=0.1, over=0.5)", "z=0.1, over=0.5)\\\n        ")
+    source, (site,) = Source(text.encode()), _sites("hold")
+    target = list(source.syntax.site(text.index("over=0.5)") + 9))
+    after = edited_together(source, {"op": "move", "sites": [site], "site": target}, edited)
+    assert ".hold(0.4)\\\n" in after.data.decode()
+    assert "# low" not in after.data.decode()
+
+
 def test_several_arguments_are_set_at_once() -> None:
     (site,) = _sites("foot")
     order = {"op": "set_many", "site": site, "values": {"z": 0.12, "x": 0.05}}

@@ -136,6 +136,18 @@ def test_a_foot_passes_its_key_points() -> None:
     assert p_base + base == pytest.approx(wanted, abs=1e-4)
 
 
+def test_a_foot_is_put_down_with_speed_where_its_ease_says_so() -> None:
+    """At rest it is nearly down long before: then a trunk that is 3 mm too low has it touch."""
+    heights = []
+    for ease in ("minimum_jerk", "in"):
+        line = Timeline().foot("FR", z=0.08, over=0.6).down("FR", over=0.6, ease=ease)
+        plan = plan_of(line)
+        before, after = (plan.at(t).p_world_feet[Leg.FR, 2] for t in (line.end - 0.06, line.end))
+        heights.append(before - after)
+    at_rest, with_speed = heights
+    assert at_rest < 0.001 < 0.01 < with_speed
+
+
 def test_in_the_frame_of_the_body_a_raised_foot_goes_with_the_trunk() -> None:
     def paw(frame: str) -> np.ndarray:
         line = Timeline().foot("FR", z=0.1, over=0.6, frame=frame).body(z=-0.05, over=0.6)

@@ -235,7 +235,7 @@ def test_a_bar_ends_on_a_beat_of_the_song(tab: Tab, file: Path) -> None:
     tab.page.mouse.move(right - 3 + 0.5 * second + 2, middle, steps=3)
     tab.page.mouse.up()
     tab.wait_for(SETTLED)
-    end = _number(file, r"body\(z=-LOW, over=([\d.]+)\)")
+    end = _number(file, r"body\(z=-LOW, over=([\d.]+), ease=\"cubic\"\)")  # it turns back there
     assert np.abs(np.array(beats) - end).min() < 0.001
     assert abs((end - 0.5 + 0.3) % 0.6 - 0.3) < ON_BEAT, "a click track of 100 begins at 0.5 s"
     tab.page.get_by_label("Music", exact=True).select_option(index=0)

@@ -297,18 +297,20 @@ class Studio {
     if (orders.length) this.send(orders.length > 1 ? { op: "many", orders } : orders[0], true);
   }
 
-  // The argument with which a call ends at `end` [s], or on a beat at most `room` [s] away.
+  // The arguments with which a call ends at `end` [s], or on a beat at most `room` [s] away.
   /**
    * @param {Bar} bar
    * @param {number} end
    * @param {number} room
    */
-  durationFor(bar, end, room) {
+  lengthFor(bar, end, room) {
     const beat = this.beats.find((one) => Math.abs(one - end) < room);
     const nudge = this.timeUnit === "beats" ? BEAT_NUDGE : NUDGE;
     const exact = ratio(bar) * ((beat ?? end) - bar.span[1]);
     const isOff = this.timeUnit === "s" && beat !== undefined; // the song's beats fit no step
-    return Math.max(isOff ? Math.round(1000 * exact) / 1000 : rounded(exact, nudge), nudge);
+    const value = Math.max(isOff ? Math.round(1000 * exact) / 1000 : rounded(exact, nudge), nudge);
+    const isAccent = beat !== undefined && bar.name in ACCENTS && bar.more.includes("ease");
+    return { [lengthOf(bar).name]: value, ...(isAccent ? { ease: ACCENTS[bar.name] } : {}) };
   }
 
   /**

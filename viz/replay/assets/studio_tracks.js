@@ -222,7 +222,7 @@ class Tracks {
     const perSecond = this.width / this.view.length;
     const item = this.items.find((one) => one.index === index && this.made.get(`${one.lane}/${index}`) === button);
     let offset = 0;
-    let value = null;
+    let values = null;
     button.setPointerCapture(event.pointerId);
     const move = (now) => {
       if (this.view.pinched) return;
@@ -236,10 +236,10 @@ class Tracks {
         this.aim(now.clientX);
         return;
       }
-      value = this.studio.durationFor(bar, bar.span[2] + offset / perSecond, SNAP / perSecond);
+      values = this.studio.lengthFor(bar, bar.span[2] + offset / perSecond, SNAP / perSecond);
       const [start, begin] = bar.span;
-      this.place(button, item, [start, begin, begin + value / ratio(bar)]);
-      this.studio.set(bar, lengthOf(bar).name, value, false);
+      this.place(button, item, [start, begin, begin + values[lengthOf(bar).name] / ratio(bar)]);
+      this.studio.setMany(bar, values, false);
     };
     const drop = () => {
       button.removeEventListener("pointermove", move);
@@ -251,7 +251,7 @@ class Tracks {
       this.mark.hidden = true;
       if (!was) return;
       this.isDragDone = true;
-      if (isEdge) this.studio.set(bar, lengthOf(bar).name, value, true);
+      if (isEdge) this.studio.setMany(bar, values, true);
       else if (goal !== null && goal !== this.studio.order().place) this.studio.move(goal);
       else this.draw();
     };

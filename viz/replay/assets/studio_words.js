@@ -138,3 +138,6 @@ function unitOf({ name, of, is_angle: isAngle }, timeUnit) {
 function unitName(unit) {
   return { "°": "degrees", m: "metres", s: "seconds", rad: "radians", beats: "beats" }[unit] ?? unit;
 }
+
+// How a call ends that is seen or heard on its beat: at rest a foot lands early, a trunk turns back late.
+const ACCENTS = { body: "cubic", pose: "cubic", look_at: "cubic", down: "in" };
