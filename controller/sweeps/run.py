@@ -18,7 +18,7 @@ from controller.sweeps.sweep_file import SEED, Columns, Row, SweepFile
 from controller.sweeps.targets import digest, target_of
 from go2_wbc.arguments import typed
 from go2_wbc.brief import brief, inline_html
-from go2_wbc.errors import CommandError, MissingDependency, SweepError, install_line, unknown_name
+from go2_wbc.errors import CommandError, SweepError, needing, unknown_name
 from go2_wbc.files import checked_output, write_atomically
 
 FOLDER = Path("out/sweeps")  #: Where rows are kept if nothing else is said
@@ -260,7 +260,7 @@ def export_rows(result: SweepResult, path: Path | str) -> Path:
 def require_exporter(path: Path | str) -> None:
     """See that what an export needs is there, before the work begins; raises as ``export_rows``."""
     if checked_output(path, EXPORT_SUFFIXES).suffix.lower() == ".parquet":
-        _pyarrow()
+        pyarrow_of("sweep")
 
 
 def _csv(result: SweepResult) -> bytes:
@@ -272,7 +272,7 @@ def _csv(result: SweepResult) -> bytes:
 
 
 def _parquet(result: SweepResult) -> bytes:
-    pyarrow, parquet = _pyarrow()
+    pyarrow, parquet = pyarrow_of("sweep")
     kinds = {
         "float": pyarrow.float64(),
         "int": pyarrow.int64(),
@@ -286,11 +286,9 @@ def _parquet(result: SweepResult) -> bytes:
     return stream.getvalue()
 
 
-def _pyarrow() -> tuple[Any, Any]:
-    try:
+def pyarrow_of(extra: str) -> tuple[Any, Any]:
+    """The modules pyarrow and pyarrow.parquet, which this extra brings."""
+    with needing(extra, "Parquet needs pyarrow"):
         import pyarrow
         from pyarrow import parquet
-    except ImportError as error:
-        line = install_line("sweep")
-        raise MissingDependency(f"Parquet needs pyarrow ({error}): {line}") from error
     return pyarrow, parquet

@@ -15,7 +15,7 @@ import pinocchio as pin
 from jaxtyping import Bool, Float
 from scipy.spatial.transform import Rotation, Slerp
 
-from go2_wbc.errors import MissingDependency, PlanNotFound, TimelineError, install_line
+from go2_wbc.errors import PlanNotFound, TimelineError, needing
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
@@ -199,13 +199,8 @@ def optimum(
 
 def require_crocoddyl() -> None:
     """Raise MissingDependency unless crocoddyl can be imported."""
-    try:
+    with needing("dynamics", "dynamic motions are solved with crocoddyl"):
         import crocoddyl  # noqa: F401
-    except ImportError as error:
-        raise MissingDependency(
-            f"dynamic motions are solved with crocoddyl, which cannot be imported ({error}): "
-            f"{install_line('dynamics')}"
-        ) from error
 
 
 def _misses(knots: Knots, plan: DynamicTrajectory) -> tuple[Miss, ...]:
