@@ -1,7 +1,5 @@
 """A controller is put together whole or not at all."""
 
-import subprocess
-import sys
 import threading
 
 import pytest
@@ -13,6 +11,7 @@ from go2_wbc.errors import ConfigError, PlantError
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco import viewer
 from tests.controller.plants import StillPlant
+from tests.script_server import python
 
 
 class Window:
@@ -120,5 +119,4 @@ def test_nothing_is_left_to_compile_when_the_robot_has_been_taken_over() -> None
         "assert go2.stand() and go2.walk() and go2.sit()\n"
         "print(sorted(loaded() - before), len(before) > 20)\n"
     )
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert run.stdout.strip() == "[] True"
+    assert python("-c", script).stdout.strip() == "[] True"

@@ -1,7 +1,5 @@
 """The authoring language: cursor, tracks, joining, mirror images, and what it refuses."""
 
-import subprocess
-import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -20,6 +18,7 @@ from motions.language.timeline_data import SHIFT_TIME
 from motions.plan.quasi_static import FootContacts
 from motions.postures import home_poses
 from tests.motions.plans import MODEL, curves_at, plan_of
+from tests.script_server import python
 
 HOME = home_poses(MODEL)[Posture.STAND]
 EXACT = 1e-9
@@ -224,8 +223,7 @@ for write in ('Timeline().then("bow")', "Timeline().together(7)", 'Timeline(entr
 
 def test_what_has_the_wrong_type_is_refused_with_what_would_be_right() -> None:
     """In a process of its own: here types are checked before that."""
-    run = subprocess.run([sys.executable, "-c", WRONG_TYPES], capture_output=True, text=True)
-    then, together, entry = run.stdout.splitlines()
+    then, together, entry = python("-c", WRONG_TYPES).stdout.splitlines()
     assert then.startswith("TimelineError then() takes timelines, got 'bow'")
     assert then.endswith("load_motion('bow')")
     assert together == "TimelineError together() takes timelines, got 7"
