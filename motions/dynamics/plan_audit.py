@@ -97,22 +97,14 @@ _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """The worst of one quantity over a plan.
+    """The worst of one quantity over a plan."""
 
-    Attributes:
-        name: of the quantity.
-        value: the worst.
-        limit: what it must not exceed, at least 0.
-        unit: of both.
-        subject, time: whose it is, and when [s].
-    """
-
-    name: str
-    value: float
-    limit: float
-    unit: str
-    subject: str
-    time: float
+    name: str  #: of the quantity
+    value: float  #: the worst
+    limit: float  #: what it must not exceed, at least 0
+    unit: str  #: of both
+    subject: str  #: whose it is
+    time: float  #: when [s]
 
     @property
     def is_kept(self) -> bool:

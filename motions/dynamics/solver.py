@@ -82,14 +82,10 @@ def solve(
 
 @dataclass(frozen=True, slots=True)
 class Solved:
-    """A problem and its plan, from which the search for another of the same phases may begin.
+    """A problem and its plan, from which the search for another of the same phases may begin."""
 
-    Attributes:
-        problem, plan: what was asked, and what was found.
-    """
-
-    problem: PhaseProblem
-    plan: DynamicTrajectory
+    problem: PhaseProblem  #: what was asked
+    plan: DynamicTrajectory  #: what was found
 
 
 def continued(
@@ -127,23 +123,14 @@ def _ends(problem: PhaseProblem) -> Float[np.ndarray, " k"]:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What is solved, and what is then asked of the plan.
+    """What is solved, and what is then asked of the plan."""
 
-    Attributes:
-        knots: the problem.
-        model: the robot.
-        limits: what the plan keeps.
-        weights: what being off costs.
-        tolerance: how far it may be from what was asked.
-        misses: measures how far that is.
-    """
-
-    knots: Knots
+    knots: Knots  #: the problem
     model: RobotModel
-    limits: PlanLimits
-    weights: Weights
-    tolerance: Tolerance
-    misses: Callable[[Knots, DynamicTrajectory], tuple[Miss, ...]]
+    limits: PlanLimits  #: what the plan keeps
+    weights: Weights  #: what being off costs
+    tolerance: Tolerance  #: how far it may be from what was asked
+    misses: Callable[[Knots, DynamicTrajectory], tuple[Miss, ...]]  #: measures how far that is
 
     def plan(self, found: Solution) -> DynamicTrajectory:
         """The plan of what the search found."""
