@@ -45,20 +45,14 @@ def is_collecting(request: pytest.FixtureRequest) -> Iterator[bool]:
     (gc.enable if before else gc.disable)()
 
 
-def test_no_garbage_is_looked_for_during_an_import(
+def test_no_garbage_is_looked_for_during_an_import_and_as_before_after_one_that_fails(
     is_collecting: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = package(tmp_path, f"lazy_package_{is_collecting}", "was_collecting", MODULE)
     monkeypatch.syspath_prepend(tmp_path)
     assert import_module(made).was_collecting is False
     assert gc.isenabled() is is_collecting
-
-
-def test_an_import_that_fails_leaves_the_collector_as_it_was(
-    is_collecting: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
     made = package(tmp_path, f"lazy_failing_{is_collecting}", "Thing", "import no_such_module\n")
-    monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ModuleNotFoundError, match="no_such_module"):
         _ = import_module(made).Thing
     assert gc.isenabled() is is_collecting
