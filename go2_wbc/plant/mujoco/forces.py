@@ -228,7 +228,7 @@ class Pushes:
         f_world = np.array(force, dtype=float)
         if f_world.shape != (3,) or not np.isfinite(f_world).all():
             raise CommandError(f"push force must be three finite numbers [N], got {force!r}")
-        if not 0.0 < duration <= LARGEST:
+        if isinstance(duration, bool) or not 0.0 < duration <= LARGEST:
             raise CommandError(f"push duration must be positive and finite [s], got {duration!r}")
         body, point = self._point(at)
         steps = max(1, round(duration / self._model.opt.timestep))

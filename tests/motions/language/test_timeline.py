@@ -179,10 +179,8 @@ NOD = Timeline().body(pitch=0.1, over=0.5)
         (lambda: Timeline().foot("FR", z=1.6, over=1.0), "z is 1.6 m, more than 1.5 m"),
         (lambda: Timeline().bpm(60.0, shift_time=0.0), "shift_time must be a number above 0"),
         (lambda: Timeline().body(over=1.0), "body.. needs one of x, y, z, roll, pitch, yaw"),
-        (lambda: Timeline().body(z=float("nan"), over=1.0), "z must be a finite number, got nan"),
         (lambda: Timeline().body(z=0.1, over=0.0), "over must be a number above 0, got 0.0"),
         (lambda: Timeline().body(z=0.1, over=-1.0), "over must be a number above 0, got -1.0"),
-        (lambda: Timeline().hold(float("inf")), "over must be a number above 0, got inf"),
         (lambda: Timeline().at(-1.0), "at.. needs a time of 0 s or later, got -1.0"),
         (lambda: Timeline().bpm(0.0), "bpm must be a number above 0"),
         (
