@@ -143,20 +143,15 @@ class Tolerance:
 class PhaseProblem:
     """A dynamic motion to be solved.
 
-    Attributes:
-        phases: one after the other; the last one stands on four feet.
-        initial: where it starts; ``None`` is standing at rest.
-        final: where it ends; ``None`` is standing at rest over the last places of the feet.
-        tolerance: how far the plan may be from the phases.
-
     Raises:
         TimelineError: for phases that do not fit each other.
     """
 
-    phases: tuple[Phase, ...]
-    initial: FullState | None = None
+    phases: tuple[Phase, ...]  #: one after the other; the last one stands on four feet
+    initial: FullState | None = None  #: where it starts; None is standing at rest
     final: FullState | None = None
-    tolerance: Tolerance = Tolerance()
+    """Where it ends; None is standing at rest over the last places of the feet."""
+    tolerance: Tolerance = Tolerance()  #: how far the plan may be from the phases
 
     def __post_init__(self) -> None:
         """Check that every foot lands where it then stands."""
