@@ -123,36 +123,27 @@ class Slider:
 @typed()
 @dataclass(frozen=True, slots=True)
 class ReplayContent:
-    """What to show.
+    """What to show."""
 
-    Attributes:
-        recording: the movement of the solid robot.
-        is_plan: it is a plan; otherwise it was measured.
-        verdict: what to say about the motion.
-        ghost: the plan of what was measured, shown translucent; its clock starts with the
-            recording's, and the verdict is on it.
-        written: what was written, where the plan is only the nearest to it; shown translucent in
-            another colour. Of its forces, torques and margins nothing is shown.
-        beats: instants [s] that the motion counts in, drawn as a ruler.
-        sliders: parameters that a live page lets one choose.
-        sound: an MP3 file that starts with the recording, played in step with it; empty for none.
-        end_pose: where the movement shall end: x, y [m] and yaw [rad] of the frame of the feet.
-        bar: beats of a bar, and the number of the beat on which the first begins.
-        editor: what a page that edits the motion's file shows of it, as for JSON; see
-            ``controller.studio``.
-    """
-
-    recording: Recording
-    is_plan: bool = False
-    verdict: Verdict | None = None
+    recording: Recording  #: the movement of the solid robot
+    is_plan: bool = False  #: it is a plan; otherwise it was measured
+    verdict: Verdict | None = None  #: what to say about the motion
     ghost: Recording | None = None
+    """The plan of what was measured, shown translucent; its clock starts with the recording's, and
+    the verdict is on it."""
     written: Recording | None = None
-    beats: tuple[float, ...] = ()
-    sliders: tuple[Slider, ...] = ()
+    """What was written, where the plan is only the nearest to it; shown translucent in another
+    colour. Of its forces, torques and margins nothing is shown."""
+    beats: tuple[float, ...] = ()  #: instants [s] that the motion counts in, drawn as a ruler
+    sliders: tuple[Slider, ...] = ()  #: parameters that a live page lets one choose
     sound: bytes = b""
+    """An MP3 file that starts with the recording, played in step with it; empty for none."""
     end_pose: tuple[float, float, float] | None = None
-    bar: tuple[int, int] = (4, 0)
+    """Where the movement shall end: x, y [m] and yaw [rad] of the frame of the feet."""
+    bar: tuple[int, int] = (4, 0)  #: its beats, and the number of that on which the first begins
     editor: Mapping[str, object] | None = None
+    """What a page that edits the motion's file shows of it, as for JSON; see
+    ``controller.studio``."""
 
     __repr__ = brief
 
