@@ -10,7 +10,7 @@ from go2_wbc.config import Config
 from go2_wbc.errors import ConfigError, PlantError
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco import viewer
-from tests.controller.plants import StillPlant
+from tests.controller.plants import StillPlant, failing
 from tests.script_server import python
 
 
@@ -53,11 +53,8 @@ def test_a_plant_that_another_pilot_drives_leaves_no_window_open(window: Window)
 def test_a_pilot_that_cannot_be_made_leaves_no_thread_behind(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def fail(*_: object) -> None:
-        raise RuntimeError("no pilot")
-
     before = threading.active_count()
-    monkeypatch.setattr(assembly, "Pilot", fail)
+    monkeypatch.setattr(assembly, "Pilot", failing(RuntimeError("no pilot")))
     with pytest.raises(RuntimeError, match="no pilot"):
         build_pilot(StillPlant(), Config(), realtime=True)
     assert threading.active_count() == before

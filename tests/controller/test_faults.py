@@ -24,6 +24,7 @@ from tests.controller.plants import (
     PERIOD,
     WatchedPlant,
     break_qp,
+    failing,
     in_thread,
     is_limp,
 )
@@ -33,13 +34,6 @@ FEEBLE = 0.05  # A share of the motors' torque with which the legs cannot carry 
 HEAVY = 40.0  # kg; two and a half times the robot's own mass
 # N for 0.2 s at the trunk: 60 N s, three times what a standing robot withstands.
 SHOVE = np.array([0.0, 500.0, 0.0])
-
-
-def raising(error: BaseException) -> Callable[[], None]:
-    def act() -> None:
-        raise error
-
-    return act
 
 
 class TestWatchedPlantContract(PlantContract):
@@ -90,7 +84,7 @@ def test_a_qp_that_stays_infeasible_ends_in_a_limp_robot_that_says_why(
 def test_a_plant_that_stops_answering_ends_the_call_and_is_used_again_when_it_answers(
     plant: WatchedPlant, go2: GO2Controller
 ) -> None:
-    plant.once_at(MID_RISE, raising(PlantTimeout("the robot does not answer")))
+    plant.once_at(MID_RISE, failing(PlantTimeout("the robot does not answer")))
     with pytest.raises(PlantTimeout, match="the robot does not answer"):
         go2.stand()
     assert go2.mode is Mode.DAMPED
@@ -160,7 +154,7 @@ def test_physics_that_diverges_ends_the_call_with_the_reason(
 def test_a_bug_in_a_plant_comes_out_as_it_is_and_leaves_the_robot_limp(
     plant: WatchedPlant, go2: GO2Controller
 ) -> None:
-    plant.once_at(MID_RISE, raising(ZeroDivisionError("a bug")))
+    plant.once_at(MID_RISE, failing(ZeroDivisionError("a bug")))
     with pytest.raises(ZeroDivisionError):
         go2.stand()
     assert go2.mode is Mode.DAMPED
@@ -169,7 +163,7 @@ def test_a_bug_in_a_plant_comes_out_as_it_is_and_leaves_the_robot_limp(
 
 
 def test_in_realtime_a_plant_that_fails_ends_the_waiting_call(plant: WatchedPlant) -> None:
-    plant.from_time(0.1, raising(PlantTimeout("the robot does not answer")))
+    plant.from_time(0.1, failing(PlantTimeout("the robot does not answer")))
     with GO2Controller(plant=plant, realtime=True) as go2:
         with pytest.raises(PlantTimeout):
             in_thread(go2.stand).result(HANG_GUARD)
@@ -183,7 +177,7 @@ def test_in_realtime_a_plant_that_fails_ends_the_waiting_call(plant: WatchedPlan
 
 
 def test_leaving_the_with_block_by_ctrl_c_closes_and_damps(plant: WatchedPlant) -> None:
-    plant.once_at(MID_RISE, raising(KeyboardInterrupt()))
+    plant.once_at(MID_RISE, failing(KeyboardInterrupt()))
     with pytest.raises(KeyboardInterrupt), GO2Controller(plant=plant) as go2:
         go2.stand()
     assert go2.mode is Mode.CLOSED
