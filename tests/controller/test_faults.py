@@ -135,17 +135,6 @@ def test_a_clock_that_does_not_go_on_and_a_state_that_is_not_finite_end_the_call
     assert f"no {lack} state" in go2.last_outcome.reason
 
 
-def test_one_state_that_is_not_finite_is_passed_over(
-    plant: WatchedPlant, go2: GO2Controller
-) -> None:
-    def corrupt(state: RobotState) -> RobotState:
-        is_bad = abs(state.time - MID_RISE) < PERIOD / 2
-        return replace(state, v=np.full(18, np.inf)) if is_bad else state
-
-    plant.on_read = corrupt
-    assert go2.stand()
-
-
 def test_physics_that_diverges_ends_the_call_with_the_reason(
     plant: WatchedPlant, go2: GO2Controller
 ) -> None:
