@@ -287,6 +287,22 @@ class Pushes:
 
 
 @dataclass(frozen=True, slots=True)
+class FootContacts:
+    """Where each foot touches, and how the touching material moves there.
+
+    The velocity is that of the point of the foot that is at the contact now, not of the foot's
+    centre: a round foot that rolls has a moving centre and a resting contact point.
+    """
+
+    p_world_contact: Float[np.ndarray, "4 3"]
+    """The deepest contact point of each foot [m]; nan without contact."""
+    v_world_contact: Float[np.ndarray, "4 3"]
+    """Tangential velocity of the foot's material there [m/s]; 0 without contact."""
+
+    __repr__ = brief
+
+
+@dataclass(frozen=True, slots=True)
 class Contacts:
     """All contacts of one instant as MuJoCo holds them, copied: quick to take, evaluated later.
 
@@ -321,12 +337,7 @@ class Contacts:
 def foot_contacts(
     instants: Sequence[Contacts],
 ) -> tuple[Float[np.ndarray, "t 4 3"], Float[np.ndarray, "t 4 3"]]:
-    """Where each foot touches [m], and the tangential velocity of its material there [m/s].
-
-    At each of the instants; nan and 0 without contact. The place is the deepest contact point. The
-    velocity is that of the point of the foot that is at the contact now, not of the foot's centre:
-    a round foot that rolls has a moving centre and a resting contact point.
-    """
+    """Points and velocities as in ``FootContacts``, at each of the instants."""
     points, velocities = np.full((len(instants), 4, 3), np.nan), np.zeros((len(instants), 4, 3))
     when, codes, distances = _gathered(instants)
     legs = codes - FOREIGN

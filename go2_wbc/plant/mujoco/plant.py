@@ -21,7 +21,9 @@ from go2_wbc.plant.mujoco.forces import (
     ROBOT_BINS,
     TRUNK_BIN,
     Contacts,
+    FootContacts,
     Pushes,
+    foot_contacts,
     ground_forces,
     read_joints,
 )
@@ -384,6 +386,10 @@ class MujocoPlant(Plant):
         """Centres of the feet in the world [m]."""
         self._check_open()
         return self._data.geom_xpos[self._layout.foot_geoms].copy()
+
+    def foot_contacts(self) -> FootContacts:
+        """Contact points of the feet and the velocities of their material there."""
+        return FootContacts(*(rows[0] for rows in foot_contacts([self.contacts()])))
 
     def contacts(self) -> Contacts:
         """Every contact now, to be evaluated later."""

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.plant.mujoco.forces import foot_contacts
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 from go2_wbc.recording import true_runs
 from go2_wbc.robot.model import RobotModel
@@ -62,12 +61,13 @@ def test_a_recording_begins_with_the_present_state_or_at_a_time() -> None:
 def test_what_was_recorded_is_what_the_plant_said_at_that_tick() -> None:
     plant = MujocoPlant()
     truth = GroundTruth(plant)
-    said = [foot_contacts([plant.contacts()])]
+    said = [plant.foot_contacts()]
     for _ in range(TICKS):
         truth.write(JointCommand.torque(np.full(12, 8.0)))
-        said.append(foot_contacts([plant.contacts()]))
+        said.append(plant.foot_contacts())
     recorded = truth.recording()
-    points, velocities = (np.concatenate(rows) for rows in zip(*said, strict=True))
+    points = np.array([contacts.p_world_contact for contacts in said])
+    velocities = np.array([contacts.v_world_contact for contacts in said])
     assert np.array_equal(recorded.p_world_contacts, points, equal_nan=True)
     assert np.array_equal(recorded.v_world_contacts, velocities)
     assert len(np.unique(velocities, axis=0)) > TICKS // 2

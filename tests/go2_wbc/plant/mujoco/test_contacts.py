@@ -9,7 +9,6 @@ import pytest
 from go2_wbc.errors import CommandError
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.plant.mujoco.forces import foot_contacts
 from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.state import JointCommand
 from tests.go2_wbc.plant.contract import DAMPED
@@ -37,15 +36,16 @@ def test_the_forces_on_a_lying_robot_sum_to_its_weight_below_its_feet_and_in_the
     parts = plant.read().foot_forces.sum() + plant.base_contact_force + plant.limb_contact_force
     assert parts == pytest.approx(plant.total_mass * GRAVITY, rel=STATIC_TOLERANCE)
     stand_up(plant)
-    below = foot_contacts([plant.contacts()])[0][0] - plant.p_world_feet
+    contacts = plant.foot_contacts()
+    below = contacts.p_world_contact - plant.p_world_feet
     assert below == pytest.approx(np.tile([0.0, 0.0, -FOOT_RADIUS], (4, 1)), abs=SINKING)
     fly(plant)
     plant.write(DAMPED)
     assert not plant.read().foot_forces.any()
     assert not plant.read().feet_in_contact.any()
-    points, velocities = foot_contacts([plant.contacts()])
-    assert np.isnan(points).all()
-    assert not velocities.any()
+    contacts = plant.foot_contacts()
+    assert np.isnan(contacts.p_world_contact).all()
+    assert not contacts.v_world_contact.any()
 
 
 @pytest.mark.parametrize(
@@ -69,8 +69,8 @@ def test_contact_velocity_is_that_of_the_feets_material(
     plant.push(np.array([60.0, 80.0, 0.0]), 0.1)
     for _ in range(60):
         plant.write(JointCommand.servo(STAND, np.zeros(12), 60.0, 3.0))
-    state, ((points,), (velocities,)) = plant.read(), foot_contacts([plant.contacts()])
-    touching = np.isfinite(points[:, 0])
+    state, contacts = plant.read(), plant.foot_contacts()
+    touching = np.isfinite(contacts.p_world_contact[:, 0])
     assert touching.any()
     data = robot.createData()
     pin.forwardKinematics(robot, data, state.q, state.v)
@@ -78,11 +78,11 @@ def test_contact_velocity_is_that_of_the_feets_material(
     for leg in np.flatnonzero(touching):
         frame = robot.getFrameId(FOOT_NAMES[leg])
         twist = pin.getFrameVelocity(robot, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-        arm = points[leg] - data.oMf[frame].translation
+        arm = contacts.p_world_contact[leg] - data.oMf[frame].translation
         expected = twist.linear + np.cross(twist.angular, arm)
-        assert np.allclose(velocities[leg, :2], expected[:2], atol=EXACT)
-        assert velocities[leg, 2] == pytest.approx(0.0, abs=EXACT)
-        assert not np.allclose(velocities[leg], twist.linear, atol=1e-3)
+        assert np.allclose(contacts.v_world_contact[leg, :2], expected[:2], atol=EXACT)
+        assert contacts.v_world_contact[leg, 2] == pytest.approx(0.0, abs=EXACT)
+        assert not np.allclose(contacts.v_world_contact[leg], twist.linear, atol=1e-3)
 
 
 def test_low_friction_lets_the_feet_slide_and_high_friction_does_not() -> None:

@@ -326,7 +326,7 @@ def test_a_closed_plant_refuses_pushes_and_measurements(plant: MujocoPlant) -> N
     with pytest.raises(ClosedError):
         plant.push(np.ones(3), 0.1)
     with pytest.raises(ClosedError):
-        plant.contacts()
+        plant.foot_contacts()
 
 
 def test_the_viewer_without_a_display_says_so_instead_of_ending_the_process(
