@@ -279,7 +279,7 @@ class Reference:
 class Anchor:
     """Where a motion takes place: its frame has z up, x ahead, and its origin on the ground."""
 
-    p_world: Float[np.ndarray, "3"]  #: the origin: the middle of the feet on the ground [m]
+    p_world: Float[np.ndarray, "3"]  #: the origin, the middle of the feet on the ground [m]
     yaw: float  #: heading of the feet [rad]
 
     @property

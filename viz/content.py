@@ -139,7 +139,7 @@ class ReplayContent:
     sound: bytes = b""
     """An MP3 file that starts with the recording, played in step with it; empty for none."""
     end_pose: tuple[float, float, float] | None = None
-    """Where the movement shall end: x, y [m] and yaw [rad] of the frame of the feet."""
+    """Where the movement shall end, x, y [m] and yaw [rad] of the frame of the feet."""
     bar: tuple[int, int] = (4, 0)  #: its beats, and the number of that on which the first begins
     editor: Mapping[str, object] | None = None
     """What a page that edits the motion's file shows of it, as for JSON; see

@@ -26,7 +26,7 @@ class Moment:
     """What a step has led to."""
 
     state: RobotState  #: in truth
-    command: Array3  #: what was asked: ahead, left [m/s], turning left [rad/s]
+    command: Array3  #: that was asked, ahead, left [m/s], turning left [rad/s]
     action: Float32[np.ndarray, "12"]  #: of this step, within 1
     last_action: Float32[np.ndarray, "12"]  #: of the one before
     body_force: float  #: normal force [N] of the ground on all but the feet

@@ -44,8 +44,8 @@ class Certificate:
     n: int  #: runs that were looked at
     done: int  #: those in which it was done
     interval: tuple[float, float]  #: of 95 % of the true rate
-    worst: tuple[Row, ...]  #: the worst runs, the worst first: their rows in ``path``
-    about: Mapping[str, str]  #: what it holds for: versions, and digests of code and plan
+    worst: tuple[Row, ...]  #: rows in ``path`` of the worst runs, the worst first
+    about: Mapping[str, str]  #: what it holds for, versions and digests of code and plan
     path: Path  #: the file with all rows; each can be replayed
 
     __repr__ = brief

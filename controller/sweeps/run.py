@@ -54,7 +54,7 @@ class SweepResult:
     columns: Columns  #: names and kinds of the values
     rows: list[Row]  #: in the order of their seeds, which are the first value of each
     failures: dict[int, str]  #: why seeds gave no row
-    about: dict[str, str]  #: what the rows depend on, by name: versions, digests
+    about: dict[str, str]  #: what the rows depend on, by name, as versions and digests
 
     _repr_html_ = inline_html
     __repr__ = brief

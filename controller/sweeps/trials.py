@@ -47,7 +47,7 @@ class Trial:
 
     seed: int  #: of every random number of the trial
     has_nominal_friction: bool = False  #: whether it is ``NOMINAL_FRICTION``, as for pushes
-    sensors: str = "ideal"  #: of the plant: what the controller is given of the state
+    sensors: str = "ideal"  #: of the plant, what the controller is given of the state
 
     @property
     def friction(self) -> float:

@@ -53,7 +53,7 @@ class RobotProfile:
     where nothing is configured."""
     stand_height: float  #: of the CoM above the ground when standing [m]
     sit: tuple[float, float]
-    """Height [m] of the base and pitch [rad] of the dog-like sit: rump down, front legs up."""
+    """Height [m] of the base and pitch [rad] of the dog-like sit, rump down, front legs up."""
     lie_height: float  #: of the base just above the ground, from which it goes limp [m]
     tucked: V3  #: joint angles [rad] with the feet under the hips and the belly on the ground
     underside: tuple[V3, ...]

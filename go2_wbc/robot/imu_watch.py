@@ -87,7 +87,7 @@ class WatchedImu(Record):
     stood: float  #: for how long its legs have carried it [s]
     unborne: float  #: for how long they have not [s]
     struck: float  #: for how long yet a foot counts as struck [s]
-    turning: Array3x3  #: normal equations of the gyro's error: their matrix,
+    turning: Array3x3  #: matrix of the normal equations of the gyro's error,
     turned: Array3  #: their right side,
     residual: float  #: and the squared residual
     gyro_off: Array3  #: the error that is taken off [rad/s]

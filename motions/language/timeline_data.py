@@ -132,7 +132,7 @@ class TimelineData:
     nearest motion that it can."""
     tolerance: Tolerance = field(default=Tolerance(), kw_only=True)  #: of what is solved
     longest: float = field(default=LONGEST, kw_only=True)
-    """How long [s] it may become: a slip of the pen is no motion of a day."""
+    """How long [s] it may become; a slip of the pen is no motion of a day."""
     keys: tuple[Key, ...] = field(default=(), kw_only=True)  #: what was written so far
     cursor: float = field(default=0.0, kw_only=True)  #: when [s] the next call starts
     clock: BeatClock = field(default=BeatClock(), kw_only=True)

@@ -62,7 +62,7 @@ class Beats:
     strengths: Times  #: how strongly notes begin there, 1 for the strongest
     duration: float  #: length [s] of the song
     agreement: float
-    """How regular it is: its mean correlation with itself 1 to 8 beats later, at most 1."""
+    """How regular it is, its mean correlation with itself 1 to 8 beats later, at most 1."""
     metre: int = 1
     """Beats of a bar, 3 for a waltz, 6 for one that is counted twice as fast; 1 where no bars are
     known."""

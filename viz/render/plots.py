@@ -237,8 +237,8 @@ class Relation:
     labels: tuple[tuple[str, ...], ...]  #: the bins of each parameter, in words
     stats: Float[np.ndarray, "*bins 4"]
     """Mean, both ends of its 95 % interval, and number of runs, in each bin."""
-    places: Float[np.ndarray, " k"]  #: of one parameter: its mean in each bin
-    dots: Float[np.ndarray, "n 2"]  #: of one parameter and a number: both, of every run
+    places: Float[np.ndarray, " k"]  #: of one parameter, its mean in each bin
+    dots: Float[np.ndarray, "n 2"]  #: of one parameter and a number, both, of every run
 
 
 @typed()
