@@ -31,9 +31,8 @@ COMMANDS: tuple[Command, ...] = (
     Command("gallery", "benchmarks.gallery", "play the library's motions, write their pictures"),
     Command("evidence", "benchmarks.evidence", "fill the table of docs/evidence.md"),
 )
-ALIASES = {"answers": "qp_infeasibility", "moonshots": "jump_limits", "trust": "false_negatives"}
-"""Former names of commands."""
 GONE = {
+    "answers": "`qp_infeasibility` is its name",
     "jump_limits": "docs/explanation/dynamics.md has its results, commit 55f699b its program",
     "dynamics": "commit 55f699b has the program",
     "dynamic_motions": "`feasibility --rows dynamic` plays solved motions, and more of them",
@@ -58,8 +57,6 @@ python -m benchmarks NAME --help                the options of one, with example
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the benchmark that the arguments name; see ``run_program`` for the exit codes."""
     arguments = list(sys.argv[1:] if argv is None else argv)
-    if arguments[:1] and arguments[0] in ALIASES:
-        arguments[0] = ALIASES[arguments[0]]
     if arguments[:1] and arguments[0] in GONE:
         print(f"{arguments[0]} is gone: {GONE[arguments[0]]}", file=sys.stderr)
         return ExitCode.USAGE

@@ -62,7 +62,6 @@ class StepCheck:
     """
 
     def __init__(self, robot: TrialRobot) -> None:
-        """Check ``robot``'s demo."""
         self._robot, self._before = robot, robot.plant.truth()
         self.untrue: list[str] = []
 

@@ -53,31 +53,20 @@ LIFE = 120.0  # Time [s] of a sound robot's random calls
 
 @dataclass(frozen=True, slots=True)
 class Break:
-    """What breaks.
+    """What breaks."""
 
-    Attributes:
-        name: of its rows.
-        item: what it is, for the report.
-        kind, value: of fault, as ``MujocoPlant.fault`` takes them.
-        parts: of which one breaks, or all if ``at_once``.
-        named: what the health calls a part.
-        unjudged: states in which nothing can be noticed of it.
-        at_once: whether all parts break.
-        is_of_paw: whether it is the raised leg's on three legs; None for never, as a dead sensor
-            is right of a paw in the air.
-        raised: range of the moment then [s].
-    """
-
-    name: str
-    item: str
-    kind: str
-    parts: tuple[str, ...]
+    name: str  #: of its rows
+    item: str  #: what it is, for the report
+    kind: str  #: of fault, as ``MujocoPlant.fault`` takes it, and its ``value``
+    parts: tuple[str, ...]  #: of which one breaks, or all if ``at_once``
     value: float | None = None
-    named: str = "{}"
-    unjudged: tuple[str, ...] = ()
+    named: str = "{}"  #: what the health calls a part
+    unjudged: tuple[str, ...] = ()  #: states in which nothing can be noticed of it
     at_once: bool = False
     is_of_paw: bool | None = False
-    raised: tuple[float, float] = RAISED
+    """Whether it is the raised leg's on three legs; None for never, as a dead sensor is right of a
+    paw in the air."""
+    raised: tuple[float, float] = RAISED  #: range of the moment then [s]
 
     @property
     def study(self) -> Study:

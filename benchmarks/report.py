@@ -8,6 +8,7 @@ from itertools import groupby
 from statistics import fmean, stdev
 
 from benchmarks.study import Metric, Results, Study, TrialResult
+from controller.sweeps.summary import finite
 
 WIDTH = 80
 _LINE = " {quantity:<26}{threshold:>12}{n:>4}{mean:>8}{sd:>8}{worst:>8}{seed:>5}{falls:>5}{verdict}"
@@ -50,13 +51,13 @@ class MetricResult:
             **asdict(self.metric),
             "direction": self.metric.direction.value,
             "n": self.n,
-            "mean": _finite(self.mean),
-            "sd": _finite(self.sd),
-            "worst": _finite(self.worst),
+            "mean": finite(self.mean),
+            "sd": finite(self.sd),
+            "worst": finite(self.worst),
             "worst_seed": self.worst_seed,
             "falls": self.falls,
             "passed": self.passed,
-            "values": {str(seed): _finite(value) for seed, value in self.values.items()},
+            "values": {str(seed): finite(value) for seed, value in self.values.items()},
             "failures": {str(seed): reason for seed, reason in self.failures.items()},
         }
 
@@ -162,7 +163,3 @@ def _number(value: float | None) -> str:
         return "-"
     texts = [f"{value:.{digits}g}" for digits in (3, 2, 1)]
     return next((text for text in texts if len(text) < _COLUMN), texts[-1])
-
-
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None

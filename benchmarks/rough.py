@@ -92,29 +92,17 @@ class UnreliablePlant(MujocoPlant):
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """A terrain, and how it is walked.
+    """A terrain, and how it is walked."""
 
-    Attributes:
-        name: of the scenario.
-        item: what it is, for the report.
-        terrain: by the seed.
-        speed: commanded, ahead [m/s]; negative walks backwards.
-        length: where the robot has to come [m]; None for behind the end of the terrain.
-        heading: at the start [rad].
-        bar: least share of the trials that are done.
-        sees: "lidar" or "depth", by which the robot sees; it then lives on its own sensors.
-        returns: whether it turns there and walks back.
-    """
-
-    name: str
-    item: str
-    terrain: Callable[[int], Terrain]
-    speed: float = 0.5
-    length: float | None = None
-    heading: float = 0.0
-    bar: float | None = 0.95
-    sees: str = ""
-    returns: bool = False
+    name: str  #: of the scenario
+    item: str  #: what it is, for the report
+    terrain: Callable[[int], Terrain]  #: by the seed
+    speed: float = 0.5  #: commanded, ahead [m/s]; negative walks backwards
+    length: float | None = None  #: where it has to come [m]; None for behind the terrain's end
+    heading: float = 0.0  #: at the start [rad]
+    bar: float | None = 0.95  #: least share of the trials that are done
+    sees: str = ""  #: by "lidar" or "depth"; it then lives on its own sensors
+    returns: bool = False  #: whether it turns there and walks back
 
     @property
     def study(self) -> Study:
@@ -235,19 +223,12 @@ def _barrier(way: Way) -> Study:
 
 @dataclass(frozen=True, slots=True)
 class Reversals:
-    """Level ground under hard commands.
+    """Level ground under hard commands."""
 
-    Attributes:
-        name: of the scenario.
-        item: what it is, for the report.
-        friction: in the place of what is drawn; None for that.
-        latest, lost: see ``UnreliablePlant``.
-    """
-
-    name: str
-    item: str
-    friction: float | None = None
-    latest: int = 0
+    name: str  #: of the scenario
+    item: str  #: what it is, for the report
+    friction: float | None = None  #: in the place of what is drawn; None for that
+    latest: int = 0  #: see ``UnreliablePlant``, as for ``lost``
     lost: float = 0.0
 
     @property

@@ -41,7 +41,6 @@ class BarePlaco:
     """PlaCo's ``DynamicsSolver`` on the Go2."""
 
     def __init__(self, model: RobotModel, config: WbcConfig) -> None:
-        """Load the robot into PlaCo."""
         self._model, self._config = model, config
         self._robot = load_placo_robot(model)
         self._solvers: dict[Mode, _Solver] = {}

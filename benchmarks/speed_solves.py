@@ -74,7 +74,6 @@ class Recorder(WholeBodyController):
     """Solves, and keeps ``ROUNDS`` ticks for each number of stance feet."""
 
     def __init__(self, model: RobotModel) -> None:
-        """Begin with none."""
         super().__init__(model)
         self.ticks: dict[int, list[Tick]] = {feet: [] for feet in FASTER}
 

@@ -31,7 +31,8 @@ A third-party exception is converted where the library is called (``raise ... fr
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -216,3 +217,16 @@ EXTRAS: Mapping[str, str] = {
 def install_line(extra: str, python: str = "python") -> str:
     """The command that adds an extra to the installed project, wherever it came from."""
     return f'{python} -m pip install "go2-wbc[{extra}]"'
+
+
+@contextmanager
+def needing(extra: str, told: str) -> Iterator[None]:
+    """While what an ``extra`` brings is imported.
+
+    Raises:
+        MissingDependency: if it cannot be; with what is ``told``, why, and the line that adds it.
+    """
+    try:
+        yield
+    except ImportError as error:
+        raise MissingDependency(f"{told} ({error}): {install_line(extra)}") from error

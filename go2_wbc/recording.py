@@ -20,7 +20,7 @@ from jaxtyping import Bool, Float, Int
 
 from go2_wbc.arguments import typed
 from go2_wbc.brief import cut, inline_html
-from go2_wbc.errors import EXTRAS, ConfigError, MissingDependency, install_line
+from go2_wbc.errors import EXTRAS, ConfigError, MissingDependency, install_line, needing
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.legs import JOINT_NAMES, LEGS
 
@@ -192,11 +192,8 @@ class Recording:
         Raises:
             MissingDependency: without pandas; says how to get it.
         """
-        try:
+        with needing("examples", "a table needs pandas"):
             import pandas
-        except ImportError as error:
-            line = install_line("examples")
-            raise MissingDependency(f"a table needs pandas ({error}): {line}") from error
         columns: dict[str, object] = {"time": self.time, "label": self.labels}
         for name in _ARRAYS[1:]:
             values = getattr(self, name)

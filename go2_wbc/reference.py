@@ -134,22 +134,15 @@ _COM, _BASE = TrackedPoint
 
 @dataclass(frozen=True, slots=True)
 class BodyTarget:
-    """Desired motion of the trunk, everything in the world frame.
+    """Desired motion of the trunk, everything in the world frame."""
 
-    Attributes:
-        point: whether position means the CoM or the origin of the base.
-        p_world, v_world, a_world: position [m], linear velocity [m/s] and acceleration [m/s^2].
-        R_world_base: orientation.
-        w_world, dw_world: angular velocity [rad/s] and acceleration [rad/s^2].
-    """
-
-    point: TrackedPoint
-    p_world: Float[np.ndarray, "3"]
-    v_world: Float[np.ndarray, "3"]
-    a_world: Float[np.ndarray, "3"]
-    R_world_base: Float[np.ndarray, "3 3"]
-    w_world: Float[np.ndarray, "3"]
-    dw_world: Float[np.ndarray, "3"]
+    point: TrackedPoint  #: whether position means the CoM or the origin of the base
+    p_world: Float[np.ndarray, "3"]  #: position [m]
+    v_world: Float[np.ndarray, "3"]  #: linear velocity [m/s]
+    a_world: Float[np.ndarray, "3"]  #: and acceleration [m/s^2]
+    R_world_base: Float[np.ndarray, "3 3"]  #: orientation
+    w_world: Float[np.ndarray, "3"]  #: angular velocity [rad/s]
+    dw_world: Float[np.ndarray, "3"]  #: and acceleration [rad/s^2]
 
     __repr__ = brief
 
@@ -284,15 +277,10 @@ class Reference:
 
 @dataclass(frozen=True, slots=True)
 class Anchor:
-    """Where a motion takes place: its frame has z up, x ahead, and its origin on the ground.
+    """Where a motion takes place: its frame has z up, x ahead, and its origin on the ground."""
 
-    Attributes:
-        p_world: the origin: the middle of the feet on the ground [m].
-        yaw: heading of the feet [rad].
-    """
-
-    p_world: Float[np.ndarray, "3"]
-    yaw: float
+    p_world: Float[np.ndarray, "3"]  #: the origin, the middle of the feet on the ground [m]
+    yaw: float  #: heading of the feet [rad]
 
     @property
     def pose(self) -> tuple[float, float, float]:

@@ -144,6 +144,7 @@ EXEMPT |= {
         "go2_wbc.JointCommand.torque",
         "go2_wbc.JointCommand.asked",
         *(
+            "go2_wbc.LocomotionPlanner.update(delay)",
             "go2_wbc.WholeBodyController.solve(relax)",
             "go2_wbc.Recording(robot)",
             "viz.Relation(stats)",

@@ -14,14 +14,12 @@ import os
 import re
 import shlex
 import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.script_server import run_script
+from tests.script_server import ROOT, python, run_script
 
-ROOT = Path(__file__).resolve().parent.parent
 BRIDGES = tuple(f"docs/{name}.md" for name in ("ros2", "unitree", "real_robot"))
 MADE = ("docs/reference/api/", "docs/_build/")  #: What the build of the documentation writes
 DOCS = tuple(
@@ -125,14 +123,7 @@ def run_command(words: Sequence[str], folder: Path) -> subprocess.CompletedProce
     arguments = [*program, *words[1:]]
     if words[0] != "pytest":  # it takes hold of modules as they are loaded
         return run_script(arguments, folder, _environment())
-    return subprocess.run(
-        [sys.executable, *arguments],
-        cwd=folder,
-        env=_environment(),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return python(*arguments, folder=folder, **_environment())
 
 
 def as_user(command: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:

@@ -63,6 +63,29 @@ def run_script(
     return subprocess.CompletedProcess([sys.executable, *arguments], code, *texts)
 
 
+def python(
+    *words: str, folder: Path = ROOT, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    """What ``python WORDS`` does that starts anew, with these variables besides."""
+    return subprocess.run(
+        [sys.executable, *words],
+        cwd=folder,
+        env={**os.environ, **environment},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=HANGS,
+    )
+
+
+def pytest_with(plugin: str, folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """What ``pytest WORDS`` does in a folder, with this plugin and no other."""
+    paths = os.pathsep.join([str(ROOT), str(folder)])
+    alone = {"PYTHONPATH": paths, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    return python("-m", "pytest", "-p", plugin, *words, folder=folder, **alone)
+
+
 @functools.cache
 def _server() -> subprocess.Popen[str]:
     """One for each process of tests; it ends with its input."""

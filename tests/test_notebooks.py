@@ -5,21 +5,18 @@ import importlib.util
 import json
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests.pages import USERS_BIN, as_user, difference
+from tests.script_server import ROOT, python
 
-ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "docs" / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 NAMES = ("designing_a_motion", "first_steps", "how_the_wbc_works", "reading_a_recording")
 LARGEST = 300_000  #: Bytes of a notebook with its outputs
-HANGS = 600.0  #: Time [s] after which a notebook counts as hanging; each takes about 15 s of CPU
 NEAR = 0.1
 """Relative difference from the committed numbers: a run repeats to the bit on one machine only."""
 QUANTITY = re.compile(r"(\d+(?:\.\d+)?) (mm|cm|m/s|m|rad|deg|s|ms|N m|N s|N|kg|MB|%)(?![\w^])")
@@ -68,14 +65,7 @@ def test_a_notebook_runs_from_a_clean_kernel_as_it_is_committed(
     if USERS_BIN:
         done = as_user([f"{USERS_BIN}/python", *command], tmp_path)
     else:
-        done = subprocess.run(
-            [sys.executable, *command],
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=HANGS,
-        )
+        done = python(*command, PYTHONPATH=str(ROOT))
     assert done.returncode == 0, done.stderr
     fresh = tmp_path / notebook.name
     for old, new in zip(cells(notebook), cells(fresh), strict=True):

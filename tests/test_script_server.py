@@ -1,13 +1,11 @@
 """A program that the server runs cannot tell that Python did not start it itself."""
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-from tests.script_server import ROOT, run_script
+from tests.script_server import ROOT, python, run_script
 
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "MARK": "seen"}
 TELLS = """
@@ -28,15 +26,7 @@ def test_a_program_is_told_what_python_tells_it(form: str, tmp_path: Path) -> No
     (tmp_path / "telling.py").write_text(TELLS, encoding="utf-8")
     arguments = {"file": ["telling.py"], "-c": ["-c", TELLS], "-m": ["-m", "telling"]}[form]
     arguments = [*arguments, "--wide"]
-    real = subprocess.run(
-        [sys.executable, *arguments],
-        cwd=tmp_path,
-        env=ENVIRONMENT,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    real = python(*arguments, folder=tmp_path, **ENVIRONMENT)
     done = run_script(arguments, tmp_path, ENVIRONMENT)
     assert done.stdout == real.stdout
     assert done.stderr == real.stderr

@@ -150,7 +150,6 @@ def run(
 def _run_over_ros(namespace: str, *, as_json: bool) -> int:
     """Run the demo on a robot that another process serves, print the steps."""
     from controller.bridges.ros2.demo import run_ros_demo
-    from controller.cli.common import ProgressLine
     from controller.demo.steps import DEMO_STEPS, DemoReport
 
     number = count(1)

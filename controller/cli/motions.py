@@ -297,7 +297,6 @@ def _write_compiled(
     motion: Timeline | CompiledPlan, target: Path, line: ProgressLine
 ) -> dict[str, object]:
     """Write the plan or its trajectory; returns the number of rows of the latter."""
-    from go2_wbc.files import write_atomically
     from motions import FeasibilityChecker, save_plan
     from motions.plan.trajectory import trajectory_of
 

@@ -24,21 +24,13 @@ from go2_wbc.robot.description import find_profile
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """One measured quantity.
+    """One measured quantity."""
 
-    Attributes:
-        name: what was measured.
-        measured: in ``unit``; nan if it could not be measured.
-        unit: unit of all three numbers.
-        asked: what it should be, or None if nothing was asked.
-        tolerance: greatest accepted distance from ``asked``; None accepts any.
-    """
-
-    name: str
-    measured: float
-    unit: str
-    asked: float | None = None
-    tolerance: float | None = None
+    name: str  #: what was measured
+    measured: float  #: in ``unit``; nan if it could not be measured
+    unit: str  #: of all three numbers
+    asked: float | None = None  #: what it should be, or None if nothing was asked
+    tolerance: float | None = None  #: greatest accepted distance from ``asked``; None for any
 
     @property
     def is_met(self) -> bool:
@@ -57,22 +49,15 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True)
 class StepResult:
-    """What came of one step.
-
-    Attributes:
-        name, label: identify the step, and say what was to be done.
-        ok, reason: whether the measurements show that it was done; why, in plain words.
-        start, duration: plant time [s] at which it began, and robot time [s] that it took.
-        figures: what was measured.
-    """
+    """What came of one step."""
 
     name: str
-    label: str
-    ok: bool
-    reason: str
-    start: float
-    duration: float
-    figures: tuple[Measurement, ...] = ()
+    label: str  #: what was to be done
+    ok: bool  #: whether the measurements show that it was done
+    reason: str  #: why, in plain words
+    start: float  #: plant time [s] at which it began
+    duration: float  #: robot time [s] that it took
+    figures: tuple[Measurement, ...] = ()  #: what was measured
 
     @property
     def verdict(self) -> str:
@@ -82,28 +67,22 @@ class StepResult:
 
 @dataclass(frozen=True, slots=True)
 class DemoTotals:
-    """Figures over all steps.
-
-    Attributes:
-        peak_torque_ratio: greatest |torque| / limit of any joint since the controller started.
-        peak_speed_ratio: greatest |joint velocity| / limit of any joint since then; MuJoCo does
-            not enforce it, above 1 is not physical.
-        least_support_margin: least distance [m] of the CoM's ground projection to the edge of the
-            support triangle while on three legs; nan if it never stood on three.
-        least_foot_load: least normal force [N] of a supporting foot while on three legs; nan as
-            above.
-        qp_failures: ticks in which the whole-body QP had no solution.
-        robot_time: time [s] that passed for the robot.
-        cpu_time: processor time [s] of control and physics for it, start-up and measuring excluded.
-    """
+    """Figures over all steps."""
 
     peak_torque_ratio: float
+    """Greatest |torque| / limit of any joint since the controller started."""
     peak_speed_ratio: float
+    """Greatest |joint velocity| / limit of any joint since then; MuJoCo does not enforce it, above
+    1 is not physical."""
     least_support_margin: float
+    """Least distance [m] of the CoM's ground projection to the edge of the support triangle while
+    on three legs; nan if it never stood on three."""
     least_foot_load: float
-    qp_failures: int
-    robot_time: float
+    """Least normal force [N] of a supporting foot while on three legs; nan as above."""
+    qp_failures: int  #: ticks in which the whole-body QP had no solution
+    robot_time: float  #: time [s] that passed for the robot
     cpu_time: float
+    """Processor time [s] of control and physics for it, start-up and measuring excluded."""
 
     @property
     def real_time_factor(self) -> float:
@@ -165,18 +144,14 @@ class StepRun:
 
 @dataclass(frozen=True, slots=True)
 class DemoStep:
-    """One step of the demo.
-
-    Attributes:
-        name, label: identify the step in reports, and say what is done, in at most 21 characters.
-        act: does it; False means that it was not done, None that the figures must tell.
-        measure: figures from what was measured, never from what was commanded.
-    """
+    """One step of the demo."""
 
     name: str
-    label: str
+    label: str  #: what is done, in at most 21 characters
     act: Callable[[GO2Controller], bool | None]
+    """Does it; False means that it was not done, None that the figures must tell."""
     measure: Callable[[StepRun], tuple[Measurement, ...]]
+    """Figures from what was measured, never from what was commanded."""
 
 
 def yaw_angles(recording: Recording) -> Float[np.ndarray, " n"]:
@@ -315,17 +290,12 @@ TOTALS_RATE = 500.0  #: Samples a second for the least margins and loads: short 
 
 @dataclass(frozen=True, slots=True)
 class DemoProgress:
-    """Where a running demo is; told once when a step begins and once when it has ended.
+    """Where a running demo is; told once when a step begins and once when it has ended."""
 
-    Attributes:
-        index, count, label: of the step, from 0, how many there are, and what it does.
-        result: what came of it; None when it begins.
-    """
-
-    index: int
-    count: int
-    label: str
-    result: StepResult | None = None
+    index: int  #: of the step, from 0
+    count: int  #: how many there are
+    label: str  #: what it does
+    result: StepResult | None = None  #: what came of it; None when it begins
 
 
 def run_demo(

@@ -23,19 +23,19 @@ from controller.learning.expert import EPISODE, Arrays, Expert
 from controller.learning.tasks import TASKS, Commands, Range
 from controller.observation import OBSERVATION, RATE, STANCE
 from controller.sweeps.motion_study import archive_of, plan_of
-from controller.sweeps.run import Progress, engine_of
+from controller.sweeps.run import Progress, engine_of, pyarrow_of
 from controller.sweeps.targets import digest, identity
 from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.contacts import find_gait
-from go2_wbc.errors import CommandError, ConfigError, MissingDependency, SweepError, install_line
+from go2_wbc.errors import CommandError, ConfigError, SweepError
 from go2_wbc.files import write_atomically
 from go2_wbc.legs import JOINT_NAMES, LEGS
 from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, FeasibilityChecker, Playable
 
-SUFFIX = ".parquet"
+SUFFIX, EXTRA = ".parquet", "learning"
 WALK = "walk"
 WALKS = {WALK: "velocity", "rough": "rough", "push": "push"}
 """The tasks in which the expert walks, and the environments' names for them."""
@@ -124,7 +124,7 @@ def record(
         MissingDependency: without pyarrow.
         SweepError: if an episode fails; what is finished is kept.
     """
-    _pyarrow()
+    pyarrow_of(EXTRA)
     if not (math.isfinite(minutes) and minutes > 0.0) or seed < 0:
         raise CommandError(f"minutes must be positive, and seed 0 or more: {minutes!r}, {seed!r}")
     expert, name, duration = _expert(task, gait, commands or {})
@@ -150,7 +150,7 @@ def read_dataset(path: Path | str) -> Dataset:
         ConfigError: for a folder without episodes, or one that cannot be read.
         MissingDependency: without pyarrow.
     """
-    pyarrow, parquet = _pyarrow()
+    pyarrow, parquet = pyarrow_of(EXTRA)
     files = sorted(Path(path).expanduser().glob(f"episode-*{SUFFIX}"))
     if not files:
         raise ConfigError(f"{path} holds no episodes: record(path) writes them")
@@ -223,7 +223,7 @@ def _folder(path: Path | str) -> Path:
 
 def _require_same(recorder: Recorder) -> None:
     """Raise ConfigError where the folder holds episodes of something else."""
-    _, parquet = _pyarrow()
+    _, parquet = pyarrow_of(EXTRA)
     wanted = json.loads(recorder.about)
     for file in sorted(recorder.folder.glob(f"episode-*{SUFFIX}")):
         try:
@@ -236,7 +236,7 @@ def _require_same(recorder: Recorder) -> None:
 
 
 def _parquet(columns: Arrays, about: str) -> bytes:
-    pyarrow, parquet = _pyarrow()
+    pyarrow, parquet = pyarrow_of(EXTRA)
     arrays = {}
     for name, values in columns.items():
         flat = pyarrow.array(values.ravel())
@@ -256,13 +256,3 @@ def _array(column: Any) -> np.ndarray:  # noqa: ANN401, pyarrow is untyped
     if size is None:
         return column.to_numpy(zero_copy_only=False)
     return column.flatten().to_numpy(zero_copy_only=False).reshape(-1, size)
-
-
-def _pyarrow() -> tuple[Any, Any]:
-    try:
-        import pyarrow
-        from pyarrow import parquet
-    except ImportError as error:
-        line = install_line("learning")
-        raise MissingDependency(f"data sets need pyarrow ({error}): {line}") from error
-    return pyarrow, parquet

@@ -30,19 +30,16 @@ from controller.observation import (
 )
 from go2_wbc.arguments import typed
 from go2_wbc.contacts import GAITS
-from go2_wbc.errors import CommandError, MissingDependency, PlantError, install_line, unknown_name
+from go2_wbc.errors import CommandError, PlantError, needing, unknown_name
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import FALLEN_TILT, TOUCH
 from go2_wbc.plant.mujoco.setup import SavedPhysics
 from go2_wbc.records import Array3
 from go2_wbc.world import World
 
-try:
+with needing("learning", "environments need gymnasium"):
     import gymnasium
     from gymnasium.spaces import Box
-except ImportError as error:
-    line = install_line("learning")
-    raise MissingDependency(f"environments need gymnasium ({error}): {line}") from error
 
 SENSORS = ("ideal", "noisy")
 """What the state is told with. The estimate of "imu" wants the rate of the control loop."""

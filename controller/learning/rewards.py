@@ -23,24 +23,15 @@ KNOCK = 1.0  #: Force [N] on trunk or legs from which on they knock against the 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What a step has led to.
+    """What a step has led to."""
 
-    Attributes:
-        state: in truth.
-        command: what was asked: ahead, left [m/s], turning left [rad/s].
-        action, last_action: of this step and the one before, within 1.
-        body_force: normal force [N] of the ground on all but the feet.
-        has_fallen: whether the episode ends with it.
-        period: of a step [s].
-    """
-
-    state: RobotState
-    command: Array3
-    action: Float32[np.ndarray, "12"]
-    last_action: Float32[np.ndarray, "12"]
-    body_force: float
-    has_fallen: bool
-    period: float
+    state: RobotState  #: in truth
+    command: Array3  #: that was asked, ahead, left [m/s], turning left [rad/s]
+    action: Float32[np.ndarray, "12"]  #: of this step, within 1
+    last_action: Float32[np.ndarray, "12"]  #: of the one before
+    body_force: float  #: normal force [N] of the ground on all but the feet
+    has_fallen: bool  #: whether the episode ends with it
+    period: float  #: of a step [s]
 
 
 def terms(moment: Moment) -> dict[str, float]:

@@ -29,20 +29,13 @@ WORLD = World(
 
 @dataclass(frozen=True, slots=True)
 class Commands:
-    """Which velocities are asked for.
+    """Which velocities are asked for."""
 
-    Attributes:
-        linear_x, linear_y: ahead and to the left [m/s].
-        angular_z: turning left [rad/s].
-        every: time [s] after which another is drawn.
-        standing: share of commands that are 0.
-    """
-
-    linear_x: Range = (-0.5, 1.0)
-    linear_y: Range = (-0.3, 0.3)
-    angular_z: Range = (-0.8, 0.8)
-    every: float = 5.0
-    standing: float = 0.1
+    linear_x: Range = (-0.5, 1.0)  #: ahead [m/s]
+    linear_y: Range = (-0.3, 0.3)  #: to the left [m/s]
+    angular_z: Range = (-0.8, 0.8)  #: turning left [rad/s]
+    every: float = 5.0  #: time [s] after which another is drawn
+    standing: float = 0.1  #: share of commands that are 0
 
     def draw(self, rng: np.random.Generator) -> Array3:
         """One of them."""
@@ -82,29 +75,18 @@ from legged_gym (Rudin et al., Learning to walk in minutes, 2022, table 1). Fall
 
 @dataclass(frozen=True, slots=True)
 class LearningTask:
-    """What an environment asks of the robot, and in which world.
+    """What an environment asks of the robot, and in which world."""
 
-    Attributes:
-        name: what ``task=`` takes.
-        commands: velocities to follow.
-        world: what it meets; its uncertainties are drawn for every episode.
-        delay: after which actions act [s].
-        shoves: on the trunk, if there are any.
-        terrains: one is drawn for each episode; none is a level floor.
-        weights: of the terms of the reward, by name.
-        joint_noise: standard deviation [rad] of the joints' angles at the start.
-        yaw: heading at the start [rad].
-    """
-
-    name: str
-    commands: Commands = Commands()
-    world: World = WORLD
-    delay: Range = (0.0, 0.01)
-    shoves: Shoves | None = None
-    terrains: tuple[Terrain, ...] = ()
+    name: str  #: what ``task=`` takes
+    commands: Commands = Commands()  #: velocities to follow
+    world: World = WORLD  #: what it meets; its uncertainties are drawn for every episode
+    delay: Range = (0.0, 0.01)  #: after which actions act [s]
+    shoves: Shoves | None = None  #: on the trunk, if there are any
+    terrains: tuple[Terrain, ...] = ()  #: one is drawn for each episode; none is a level floor
     weights: Mapping[str, float] = field(default_factory=lambda: WEIGHTS, hash=False)
-    joint_noise: float = JOINT_NOISE
-    yaw: Range = YAW_RANGE
+    """Of the terms of the reward, by name."""
+    joint_noise: float = JOINT_NOISE  #: standard deviation [rad] of the joints' first angles
+    yaw: Range = YAW_RANGE  #: heading at the start [rad]
 
     __repr__ = brief
 

@@ -38,7 +38,6 @@ class Board:
     """
 
     def __init__(self, memory: Memory, count: int) -> None:
-        """The ``memory`` of ``count`` environments."""
         actions, seen, told = memory
         self.actions = np.frombuffer(actions, dtype=np.float32).reshape(count, -1)
         self.seen = np.frombuffer(seen, dtype=np.float32).reshape(count, -1)

@@ -45,22 +45,15 @@ SHARES = 1.0, 0.6, 0.3, 0.1
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """How long a network is taught.
+    """How long a network is taught."""
 
-    Attributes:
-        rounds: of trotting and fitting.
-        seconds: robot time [s] in each.
-        steps: of the fit after each, if there are twice as many samples, and fewer with fewer;
-            three times as many after the last.
-        units: in each of the two layers.
-        seed: of all that is drawn.
-    """
-
-    rounds: int = 10
-    seconds: float = 120.0
+    rounds: int = 10  #: of trotting and fitting
+    seconds: float = 120.0  #: robot time [s] in each
     steps: int = 2000
-    units: int = 128
-    seed: int = 0
+    """Of the fit after each, if there are twice as many samples, and fewer with fewer; three times
+    as many after the last."""
+    units: int = 128  #: in each of the two layers
+    seed: int = 0  #: of all that is drawn
 
 
 @dataclass(frozen=True, slots=True)

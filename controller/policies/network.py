@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.errors import MissingDependency, install_line
+from go2_wbc.errors import needing
 
 BETA = 0.9, 0.999  #: Of Adam's means of the gradient, and of its square
 LEAST_DEVIATION = 1e-3  #: Of an input: what never changes is not blown up
@@ -101,12 +101,8 @@ class Network:
         Raises:
             MissingDependency: without the extra ``policies``; names the install line.
         """
-        try:
+        with needing("policies", "writing a network needs onnx"):
             from onnx import TensorProto, helper, numpy_helper
-        except ImportError as error:
-            raise MissingDependency(
-                f"writing a network needs onnx ({error}): {install_line('policies')}"
-            ) from error
         weights, biases = [W.copy() for W in self._weights], [b.copy() for b in self._biases]
         weights[0] /= self._deviation[:, None]
         biases[0] -= self._mean @ weights[0]

@@ -16,7 +16,7 @@ from jaxtyping import Float
 from controller.observation import sensed
 from controller.policies.sidecar import Sidecar
 from go2_wbc.arguments import typed
-from go2_wbc.errors import MissingDependency, PolicyError, install_line
+from go2_wbc.errors import PolicyError, needing
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.records import Array12
 from go2_wbc.robot.state import JointCommand, RobotState
@@ -177,12 +177,8 @@ class Player:
 
 def _network(path: Path, size: int) -> Network:
     """The network of an ONNX file, which must take ``size`` numbers and give 12."""
-    try:
+    with needing("policies", "a learned policy needs onnxruntime"):
         import onnxruntime
-    except ImportError as error:
-        raise MissingDependency(
-            f"a learned policy needs onnxruntime ({error}): {install_line('policies')}"
-        ) from error
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 3

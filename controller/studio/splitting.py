@@ -21,7 +21,7 @@ from motions.arguments import foot
 from motions.language.keys import BODY_CHANNELS, ON_GROUND, Frame, LegKey, LegTarget, easing
 from motions.language.tracing import Call, CallMark
 
-LEAST = 0.01  #: s or beats, of each of the two: own choice
+LEAST = 0.01  #: s or beats, of each of the two, own choice
 TRUNK = frozenset({"body", "pose", "look_at", "home"})  #: Calls after which the trunk is elsewhere
 FEET = frozenset({"foot", "leg", "joint", "down"})
 WAYS: Mapping[str, tuple[str, ...]] = {

@@ -233,7 +233,6 @@ class LocalEngine(Engine):
     """
 
     def __init__(self, workers: int) -> None:
-        """Use at most ``workers`` processes at a time."""
         self._workers = workers
 
     def run(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Ends[Item]:

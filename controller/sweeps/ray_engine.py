@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from typing import Any, final
 
 from controller.sweeps import engine
-from go2_wbc.errors import MissingDependency, SweepError, install_line
+from go2_wbc.errors import SweepError, needing
 
 ATTEMPTS = 4
 """How often an item is tried whose process or machine dies: it takes a moment until a machine is
@@ -120,9 +120,7 @@ def _ray(settings: Mapping[str, str]) -> Any:  # noqa: ANN401 - a module of an e
     """
     for name, value in settings.items():
         os.environ.setdefault(name, value)
-    try:
+    with needing("cluster", "Ray is not here"):
         import ray
         import ray.exceptions
-    except ImportError as error:
-        raise MissingDependency(f"Ray is not here ({error}): {install_line('cluster')}") from error
     return ray

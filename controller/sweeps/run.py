@@ -18,7 +18,7 @@ from controller.sweeps.sweep_file import SEED, Columns, Row, SweepFile
 from controller.sweeps.targets import digest, target_of
 from go2_wbc.arguments import typed
 from go2_wbc.brief import brief, inline_html
-from go2_wbc.errors import CommandError, MissingDependency, SweepError, install_line, unknown_name
+from go2_wbc.errors import CommandError, SweepError, needing, unknown_name
 from go2_wbc.files import checked_output, write_atomically
 
 FOLDER = Path("out/sweeps")  #: Where rows are kept if nothing else is said
@@ -27,19 +27,12 @@ ENGINES = ("local", "ray")
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a sweep has come.
+    """How far a sweep has come."""
 
-    Attributes:
-        done: seeds that have ended, those of earlier runs among them.
-        total: seeds that were asked for.
-        rate: seeds a second, in this run.
-        failure: why the seed that ended last has no row, or None.
-    """
-
-    done: int
-    total: int
-    rate: float
-    failure: Failure | None = None
+    done: int  #: seeds that have ended, those of earlier runs among them
+    total: int  #: seeds that were asked for
+    rate: float  #: seeds a second, in this run
+    failure: Failure | None = None  #: why the seed that ended last has no row, or None
 
     @property
     def share(self) -> float:
@@ -54,23 +47,14 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class SweepResult:
-    """The rows of a sweep.
+    """The rows of a sweep."""
 
-    Attributes:
-        path: of the file that keeps them.
-        name: of what was swept.
-        columns: names and kinds of the values.
-        rows: in the order of their seeds, which are the first value of each.
-        failures: why seeds gave no row.
-        about: what the rows depend on, by name: versions, digests.
-    """
-
-    path: Path
-    name: str
-    columns: Columns
-    rows: list[Row]
-    failures: dict[int, str]
-    about: dict[str, str]
+    path: Path  #: of the file that keeps them
+    name: str  #: of what was swept
+    columns: Columns  #: names and kinds of the values
+    rows: list[Row]  #: in the order of their seeds, which are the first value of each
+    failures: dict[int, str]  #: why seeds gave no row
+    about: dict[str, str]  #: what the rows depend on, by name, as versions and digests
 
     _repr_html_ = inline_html
     __repr__ = brief
@@ -260,7 +244,7 @@ def export_rows(result: SweepResult, path: Path | str) -> Path:
 def require_exporter(path: Path | str) -> None:
     """See that what an export needs is there, before the work begins; raises as ``export_rows``."""
     if checked_output(path, EXPORT_SUFFIXES).suffix.lower() == ".parquet":
-        _pyarrow()
+        pyarrow_of("sweep")
 
 
 def _csv(result: SweepResult) -> bytes:
@@ -272,7 +256,7 @@ def _csv(result: SweepResult) -> bytes:
 
 
 def _parquet(result: SweepResult) -> bytes:
-    pyarrow, parquet = _pyarrow()
+    pyarrow, parquet = pyarrow_of("sweep")
     kinds = {
         "float": pyarrow.float64(),
         "int": pyarrow.int64(),
@@ -286,11 +270,9 @@ def _parquet(result: SweepResult) -> bytes:
     return stream.getvalue()
 
 
-def _pyarrow() -> tuple[Any, Any]:
-    try:
+def pyarrow_of(extra: str) -> tuple[Any, Any]:
+    """The modules pyarrow and pyarrow.parquet, which this extra brings."""
+    with needing(extra, "Parquet needs pyarrow"):
         import pyarrow
         from pyarrow import parquet
-    except ImportError as error:
-        line = install_line("sweep")
-        raise MissingDependency(f"Parquet needs pyarrow ({error}): {line}") from error
     return pyarrow, parquet

@@ -43,17 +43,11 @@ class TrialFailed(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """The conditions that a seed stands for.
+    """The conditions that a seed stands for."""
 
-    Attributes:
-        seed: of every random number of the trial.
-        has_nominal_friction: keep the friction at ``NOMINAL_FRICTION``, as for pushes.
-        sensors: of the plant: what the controller is given of the state.
-    """
-
-    seed: int
-    has_nominal_friction: bool = False
-    sensors: str = "ideal"
+    seed: int  #: of every random number of the trial
+    has_nominal_friction: bool = False  #: whether it is ``NOMINAL_FRICTION``, as for pushes
+    sensors: str = "ideal"  #: of the plant, what the controller is given of the state
 
     @property
     def friction(self) -> float:

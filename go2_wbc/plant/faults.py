@@ -118,7 +118,6 @@ class Faults:
     """
 
     def __init__(self, description: RobotDescription) -> None:
-        """A sound robot."""
         self._description = description
         self.watch: SensorWatch | None = None
         self.known: tuple[InjectedFault, ...] = ()

@@ -260,10 +260,10 @@ class Waves(Terrain):
         return tuple(_strip(a, b) for a, b in itertools.pairwise(ends))
 
 
-def _strip(begin: Sequence[float], end: Sequence[float], thickness: float = 0.3) -> Block:
+def _strip(begin: Sequence[float], end: Sequence[float]) -> Block:
     """A flat block across the way, the upper side of which leads from one (x, z) to another."""
     way, rise = end[0] - begin[0], end[1] - begin[1]
-    angle, half = math.atan2(rise, way), 0.5 * thickness
+    angle, half = math.atan2(rise, way), 0.15  # [m] of its thickness
     x = 0.5 * (begin[0] + end[0]) + half * math.sin(angle)
     z = 0.5 * (begin[1] + end[1]) - half * math.cos(angle)
     return Block((x, 0.0, z), (0.5 * math.hypot(way, rise), HALF_WIDTH, half), pitch=-angle)

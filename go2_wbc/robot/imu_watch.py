@@ -82,62 +82,39 @@ measured by then."""
 
 
 class WatchedImu(Record):
-    """What is remembered from reading to reading.
+    """What is remembered from reading to reading."""
 
-    Attributes:
-        stood: for how long its legs have carried it [s].
-        unborne: for how long they have not [s].
-        struck: for how long yet a foot counts as struck [s].
-        turning, turned, residual: normal equations of the gyro's error, and the squared residual.
-        gyro_off, gyro_time: the error that is taken off [rad/s], for how long there has been one.
-        refining: for how long what is left is still measured [s].
-        change: of the gyro from the last reading but one to the last [rad/s].
-        jump, jump_time: the last of the gyro [rad/s], and for how long it is looked at [s].
-        jump_lasts: how long feet have to show it [s].
-        jump_seen, jump_lacks, jump_residual: sums of f . f, f . e and e . e, where feet that stand
-            would seem to move apart by f, if it were an error, and do so by e [m^2/s^2].
-        any_seen, any_lacks: the first two with feet that have just landed.
-        since: time since an error of the gyro was taken off [s].
-        speed: of the IMU by the accelerometer, drawn to that by the feet [m/s].
-        excess, most_excess: error of the accelerometer, smoothed once more, and the greatest while
-            there is one [m/s^2].
-        push, lack: by which the legs push, smoothed, and less what it feels [m/s^2].
-        force_off, force_time: the same as of the gyro, of the accelerometer [m/s^2].
-        turn: by which the gyro has turned whoever believed it until now [rad].
-        gyro_is_off, force_is_off: 1 for what is broken.
-        is_found: 1 in the moment in which an error is taken off.
-    """
-
-    stood: float
-    unborne: float
-    struck: float
-    turning: Array3x3
-    turned: Array3
-    residual: float
-    gyro_off: Array3
-    gyro_time: float
-    refining: float
-    change: Array3
-    jump: Array3
-    jump_time: float
-    jump_lasts: float
-    jump_seen: float
-    jump_lacks: float
-    jump_residual: float
-    any_seen: float
+    stood: float  #: for how long its legs have carried it [s]
+    unborne: float  #: for how long they have not [s]
+    struck: float  #: for how long yet a foot counts as struck [s]
+    turning: Array3x3  #: matrix of the normal equations of the gyro's error,
+    turned: Array3  #: their right side,
+    residual: float  #: and the squared residual
+    gyro_off: Array3  #: the error that is taken off [rad/s]
+    gyro_time: float  #: for how long there has been one [s]
+    refining: float  #: for how long what is left is still measured [s]
+    change: Array3  #: of the gyro from the last reading but one to the last [rad/s]
+    jump: Array3  #: the last of the gyro [rad/s]
+    jump_time: float  #: for how long it is looked at [s]
+    jump_lasts: float  #: how long feet have to show it [s]
+    # Feet that stand would seem to move apart by f, if it were an error, and do so by e [m/s].
+    jump_seen: float  #: sum of f . f
+    jump_lacks: float  #: of f . e
+    jump_residual: float  #: and of e . e
+    any_seen: float  #: the first two with feet that have just landed
     any_lacks: float
-    since: float
-    speed: Array3
-    excess: Array3
-    most_excess: float
-    push: Array3
-    lack: Array3
-    force_off: Array3
+    since: float  #: time since an error of the gyro was taken off [s]
+    speed: Array3  #: of the IMU by the accelerometer, drawn to that by the feet [m/s]
+    excess: Array3  #: error of the accelerometer, smoothed once more [m/s^2]
+    most_excess: float  #: the greatest while there is one
+    push: Array3  #: by which the legs push, smoothed [m/s^2]
+    lack: Array3  #: and less what the accelerometer feels
+    force_off: Array3  #: the same as of the gyro, of the accelerometer [m/s^2]
     force_time: float
-    turn: Array3
-    gyro_is_off: float
+    turn: Array3  #: by which the gyro has turned whoever believed it until now [rad]
+    gyro_is_off: float  #: 1 for what is broken, as of the next
     force_is_off: float
-    is_found: float
+    is_found: float  #: 1 in the moment in which an error is taken off
 
 
 @subroutine

@@ -82,7 +82,6 @@ class MotorWatch:
     """
 
     def __init__(self, motor: MotorModel) -> None:
-        """Watch motors of this kind."""
         self._motor = packed(motor)
         self.faults: tuple[PartFault, ...] = ()
         self.restart()

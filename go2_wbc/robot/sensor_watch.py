@@ -402,7 +402,6 @@ class SensorWatch:
     """
 
     def __init__(self, model: RobotModel) -> None:
-        """Watch ``model``'s robot."""
         self._numbers = packed(WatchNumbers.of(model))
         zeros = np.zeros(12)
         still = SensorReading(0.0, zeros[:3], zeros[:3], zeros, zeros, zeros, zeros[:4])

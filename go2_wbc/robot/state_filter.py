@@ -65,19 +65,12 @@ Covariance = Float[np.ndarray, "27 27"]
 
 
 class Filter(Record):
-    """The filter between two ticks, and what a tick works with.
+    """The filter between two ticks, and what a tick works with."""
 
-    Attributes:
-        x: the state.
-        P: covariance of its error.
-        error: as found so far in this tick.
-        column: work space, P h'.
-    """
-
-    x: Estimate
-    P: Covariance
-    error: Float[np.ndarray, "27"]
-    column: Float[np.ndarray, "27"]
+    x: Estimate  #: the state
+    P: Covariance  #: of its error
+    error: Float[np.ndarray, "27"]  #: as found so far in this tick
+    column: Float[np.ndarray, "27"]  #: work space, P h'
 
 
 @subroutine

@@ -48,21 +48,13 @@ _ARRAYS = {
 
 @dataclass(frozen=True, slots=True)
 class Miss:
-    """How far one thing is from where it was asked to be.
+    """How far one thing is from where it was asked to be."""
 
-    Attributes:
-        subject: "trunk" or the name of a foot.
-        phase: label of the phase at whose end it was asked.
-        time: [s] from the start.
-        position: distance [m].
-        angle: angle [rad], of the trunk, whole turns that were lost included; 0 of a foot.
-    """
-
-    subject: str
-    phase: str
-    time: float
-    position: float
-    angle: float
+    subject: str  #: "trunk" or the name of a foot
+    phase: str  #: label of the phase at whose end it was asked
+    time: float  #: [s] from the start
+    position: float  #: distance [m]
+    angle: float  #: [rad], of the trunk, whole turns that were lost included; 0 of a foot
 
     def __str__(self) -> str:
         angle = "" if self.subject != "trunk" else f", {np.degrees(self.angle):.1f} deg"
@@ -76,34 +68,23 @@ class DynamicTrajectory:
 
     The frame has z up, x ahead, and its origin on the ground in the middle of the feet at the
     start. Row ``k`` of what has n rows holds from ``times[k]`` to ``times[k + 1]``.
-
-    Attributes:
-        times: (n+1,) knots [s], from 0.
-        q: (n+1, 19) base position [m], quaternion x y z w, joint angles [rad].
-        v: (n+1, 18) base linear [m/s] and angular velocity [rad/s] in the base frame, joints.
-        tau: (n, 12) joint torques [N m].
-        forces: (n, 4, 3) forces of the ground on the feet [N], in the problem's frame.
-        stance: (n, 4) feet that stand.
-        gains: (n, 12, 36) feedback of a state error (as Pinocchio's ``difference`` of planned and
-            measured q, then of v) into torques: tau - gains @ error.
-        p_feet: (n+1, 4, 3) centres of the feet [m].
-        iterations, cost: of the solver, over all its starts, and at the end.
-        misses: what was asked at the phases' ends, and how far the plan is from it.
-        lag: time [s] by which the plan is late against a motion that was written as a whole.
     """
 
-    times: Float[np.ndarray, " n1"]
-    q: Float[np.ndarray, "n1 19"]
+    times: Float[np.ndarray, " n1"]  #: knots [s], from 0
+    q: Float[np.ndarray, "n1 19"]  #: base position [m], quaternion x y z w, joint angles [rad]
     v: Float[np.ndarray, "n1 18"]
-    tau: Float[np.ndarray, "n 12"]
-    forces: Float[np.ndarray, "n 4 3"]
-    stance: Bool[np.ndarray, "n 4"]
+    """Base linear [m/s] and angular velocity [rad/s] in the base frame, joints."""
+    tau: Float[np.ndarray, "n 12"]  #: joint torques [N m]
+    forces: Float[np.ndarray, "n 4 3"]  #: of the ground on the feet [N], in the problem's frame
+    stance: Bool[np.ndarray, "n 4"]  #: feet that stand
     gains: Float[np.ndarray, "n 12 36"]
-    p_feet: Float[np.ndarray, "n1 4 3"]
-    iterations: int
-    cost: float
-    misses: tuple[Miss, ...]
-    lag: float = 0.0
+    """Feedback of a state error (as Pinocchio's ``difference`` of planned and measured q, then of
+    v) into torques: tau - gains @ error."""
+    p_feet: Float[np.ndarray, "n1 4 3"]  #: centres of the feet [m]
+    iterations: int  #: of the solver, over all its starts
+    cost: float  #: at the end
+    misses: tuple[Miss, ...]  #: what was asked at the phases' ends, how far the plan is from it
+    lag: float = 0.0  #: by which it is late [s] against a motion that was written as a whole
 
     @property
     def duration(self) -> float:

@@ -143,20 +143,15 @@ class Tolerance:
 class PhaseProblem:
     """A dynamic motion to be solved.
 
-    Attributes:
-        phases: one after the other; the last one stands on four feet.
-        initial: where it starts; ``None`` is standing at rest.
-        final: where it ends; ``None`` is standing at rest over the last places of the feet.
-        tolerance: how far the plan may be from the phases.
-
     Raises:
         TimelineError: for phases that do not fit each other.
     """
 
-    phases: tuple[Phase, ...]
-    initial: FullState | None = None
+    phases: tuple[Phase, ...]  #: one after the other; the last one stands on four feet
+    initial: FullState | None = None  #: where it starts; None is standing at rest
     final: FullState | None = None
-    tolerance: Tolerance = Tolerance()
+    """Where it ends; None is standing at rest over the last places of the feet."""
+    tolerance: Tolerance = Tolerance()  #: how far the plan may be from the phases
 
     def __post_init__(self) -> None:
         """Check that every foot lands where it then stands."""
@@ -239,13 +234,11 @@ def jump(
     height: float = 0.15,
     *,
     flight: float | None = None,
-    footprint: Float[np.ndarray, "4 2"] = FOOTPRINT,
 ) -> tuple[Phase, ...]:
     """A jump ``x``, ``y`` [m] and ``yaw`` [rad] away, its feet ``height`` [m] high at the top.
 
     ``flight`` is the time in the air [s], in whole knots, by default what a fall from ``height``
     takes, so the trunk rises by that much; in less, the legs are drawn up for the rest.
-    ``footprint``: where the feet stand around their middle [m].
 
     Raises:
         TimelineError: for what no Go2 can jump.
@@ -261,8 +254,8 @@ def jump(
     return (
         Phase(GATHER, body=_at(z=CROUCH), label="crouch"),
         Phase(PUSH, label="push"),
-        Phase(half, frozenset(), feet=_moved(footprint, 0.5, (x, y, yaw), height), label="rise"),
-        Phase(half, frozenset(), feet=_moved(footprint, 1.0, (x, y, yaw), 0.0), label="fall"),
+        Phase(half, frozenset(), feet=_moved(0.5, (x, y, yaw), height), label="rise"),
+        Phase(half, frozenset(), feet=_moved(1.0, (x, y, yaw), 0.0), label="fall"),
         Phase(LAND, label="land"),
         Phase(RECOVER, body=(x, y, 0.0, 0.0, 0.0, yaw), label="stand"),
     )
@@ -279,7 +272,7 @@ def hop(times: int = 3, period: float = 0.5, height: float = 0.05) -> tuple[Phas
     _require("a hop's height", height, LOWEST, FARTHEST["height"])
     half = _half_flight(height)
     _require("the period of hops", period, 2.0 * half + PUSH, 5.0)
-    up, down = (_moved(FOOTPRINT, 1.0, (0.0, 0.0, 0.0), z) for z in (height, 0.0))
+    up, down = (_moved(1.0, _HERE, z) for z in (height, 0.0))
     phases = [Phase(GATHER, body=_at(z=CROUCH), label="crouch")]
     for count in range(1, times + 1):
         ground = PUSH if count == 1 else period - 2.0 * half
@@ -348,11 +341,11 @@ def _half_flight(height: float) -> float:
 
 
 def _moved(
-    footprint: Float[np.ndarray, "4 2"], share: float, way: tuple[float, float, float], z: float
+    share: float, way: tuple[float, float, float], z: float
 ) -> dict[Leg, tuple[float, float, float]]:
     """Shifts of the feet after ``share`` of the way x, y [m], yaw [rad], at height ``z``."""
     x, y, yaw = (share * part for part in way)
-    moved = footprint @ yaw_rotation(yaw)[:2, :2].T - footprint + [x, y]
+    moved = FOOTPRINT @ yaw_rotation(yaw)[:2, :2].T - FOOTPRINT + [x, y]
     return {leg: (float(moved[leg, 0]), float(moved[leg, 1]), z) for leg in LEGS}
 
 

@@ -30,32 +30,26 @@ SOFT = 0.1  #: Share of the costs with which a start begins; see ``Weights.softe
     clearance=NOT_NEGATIVE,
 )
 class PlanLimits:
-    """What every plan keeps.
-
-    Attributes:
-        torque_share: share of the motors' torque; the rest is the controller's, for feedback.
-        end_share: the same at the speed that a joint has at the end of a step, through which its
-            torque holds. It is reached for an instant only, so less is left; the friction of the
-            joints takes 8 % there. Bounded by the speed in the middle alone, motors at take-off
-            gave all they have for up to 10 ms of each of the last steps.
-        friction: coefficient of the cone, whose facets are inside it; less than the controller's
-            0.6.
-        force_max: normal force [N] of a foot. It costs no height and tames a push-off that would
-            otherwise end in one knot of 900 N (own experiments).
-        speed_share: share of the joints' speed limit.
-        joint_margin: distance [rad] from the joints' position limits.
-        knee_height: least height [m] of the knees' axes.
-        clearance: height [m] that a foot in the air keeps, once it is under way.
-    """
+    """What every plan keeps."""
 
     torque_share: float = 0.85
+    """Share of the motors' torque; the rest is the controller's, for feedback."""
     end_share: float = 0.95
+    """The same at the speed that a joint has at the end of a step, through which its torque holds.
+
+    It is reached for an instant only, so less is left; the friction of the joints takes 8 % there.
+    Bounded by the speed in the middle alone, motors at take-off gave all they have for up to 10 ms
+    of each of the last steps.
+    """
     friction: float = 0.5
+    """Coefficient of the cone, whose facets are inside it; less than the controller's 0.6."""
     force_max: float = 160.0
-    speed_share: float = 0.85
-    joint_margin: float = 0.03
-    knee_height: float = 0.09
-    clearance: float = 0.02
+    """Normal force [N] of a foot. It costs no height and tames a push-off that would otherwise end
+    in one knot of 900 N (own experiments)."""
+    speed_share: float = 0.85  #: of the joints' speed limit
+    joint_margin: float = 0.03  #: distance [rad] from the joints' position limits
+    knee_height: float = 0.09  #: least height [m] of the knees' axes
+    clearance: float = 0.02  #: height [m] that a foot in the air keeps, once it is under way
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,22 +91,14 @@ _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """The worst of one quantity over a plan.
+    """The worst of one quantity over a plan."""
 
-    Attributes:
-        name: of the quantity.
-        value: the worst.
-        limit: what it must not exceed, at least 0.
-        unit: of both.
-        subject, time: whose it is, and when [s].
-    """
-
-    name: str
-    value: float
-    limit: float
-    unit: str
-    subject: str
-    time: float
+    name: str  #: of the quantity
+    value: float  #: the worst
+    limit: float  #: what it must not exceed, at least 0
+    unit: str  #: of both
+    subject: str  #: whose it is
+    time: float  #: when [s]
 
     @property
     def is_kept(self) -> bool:

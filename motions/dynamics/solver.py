@@ -15,7 +15,7 @@ import pinocchio as pin
 from jaxtyping import Bool, Float
 from scipy.spatial.transform import Rotation, Slerp
 
-from go2_wbc.errors import MissingDependency, PlanNotFound, TimelineError, install_line
+from go2_wbc.errors import PlanNotFound, TimelineError, needing
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
@@ -82,14 +82,10 @@ def solve(
 
 @dataclass(frozen=True, slots=True)
 class Solved:
-    """A problem and its plan, from which the search for another of the same phases may begin.
+    """A problem and its plan, from which the search for another of the same phases may begin."""
 
-    Attributes:
-        problem, plan: what was asked, and what was found.
-    """
-
-    problem: PhaseProblem
-    plan: DynamicTrajectory
+    problem: PhaseProblem  #: what was asked
+    plan: DynamicTrajectory  #: what was found
 
 
 def continued(
@@ -127,23 +123,14 @@ def _ends(problem: PhaseProblem) -> Float[np.ndarray, " k"]:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What is solved, and what is then asked of the plan.
+    """What is solved, and what is then asked of the plan."""
 
-    Attributes:
-        knots: the problem.
-        model: the robot.
-        limits: what the plan keeps.
-        weights: what being off costs.
-        tolerance: how far it may be from what was asked.
-        misses: measures how far that is.
-    """
-
-    knots: Knots
+    knots: Knots  #: the problem
     model: RobotModel
-    limits: PlanLimits
-    weights: Weights
-    tolerance: Tolerance
-    misses: Callable[[Knots, DynamicTrajectory], tuple[Miss, ...]]
+    limits: PlanLimits  #: what the plan keeps
+    weights: Weights  #: what being off costs
+    tolerance: Tolerance  #: how far it may be from what was asked
+    misses: Callable[[Knots, DynamicTrajectory], tuple[Miss, ...]]  #: measures how far that is
 
     def plan(self, found: Solution) -> DynamicTrajectory:
         """The plan of what the search found."""
@@ -199,13 +186,8 @@ def optimum(
 
 def require_crocoddyl() -> None:
     """Raise MissingDependency unless crocoddyl can be imported."""
-    try:
+    with needing("dynamics", "dynamic motions are solved with crocoddyl"):
         import crocoddyl  # noqa: F401
-    except ImportError as error:
-        raise MissingDependency(
-            f"dynamic motions are solved with crocoddyl, which cannot be imported ({error}): "
-            f"{install_line('dynamics')}"
-        ) from error
 
 
 def _misses(knots: Knots, plan: DynamicTrajectory) -> tuple[Miss, ...]:

@@ -254,7 +254,7 @@ class StepKey(Key):
 
     leg: Leg  #: whose foot
     place: tuple[float, float, float]
-    """x, y [m] and yaw [rad], in the frame of the four feet: its origin in their middle, x along
+    """x, y [m] and yaw [rad], in the frame of the four feet, its origin in their middle, x along
     their heading. Of a single step, the way of the foot, after the frame has turned by yaw with the
     foot on it; of a square one, the pose of the frame in which the foot then stands below its
     hip."""

@@ -118,41 +118,33 @@ _Some = TypeVar("_Some", bound="TimelineData")
 
 @dataclass(frozen=True, slots=True)
 class TimelineData:
-    """An authored motion.
-
-    Attributes:
-        entry, exit, name: postures in which it starts and ends, and what to call it.
-        balance: whether the body moves over the standing feet before one is raised.
-        shift_time: how long [s] that takes, before a tempo is set.
-        shift_beats: how many beats it takes with a tempo; 0 without one.
-        counted: beats [s] of what was written before the present tempo.
-        counted_from: since when [s] the present tempo counts.
-        physics: "as_written", or "nearest": what the robot cannot do as written is solved as the
-            nearest motion that it can.
-        tolerance: how far what is solved may be from what is asked.
-        longest: how long [s] it may become: a slip of the pen is no motion of a day.
-        keys, cursor: what was written so far, and when [s] the next call starts.
-        clock: what one unit of ``over`` lasts, here and later.
-        last_start: when [s] the last call's move starts.
-        floor: the cursor does not fall behind this time [s] after ``also``.
-    """
+    """An authored motion."""
 
     entry: Posture = Posture.STAND
     exit: Posture = Posture.STAND
     name: str = field(default="motion", kw_only=True)
     balance: bool = field(default=True, kw_only=True)
+    """Whether the body moves over the standing feet before one is raised."""
     shift_time: float = field(default=SHIFT_TIME, kw_only=True)
+    """How long [s] that takes, before a tempo is set."""
     physics: str = field(default=AS_WRITTEN, kw_only=True)
-    tolerance: Tolerance = field(default=Tolerance(), kw_only=True)
+    """``"as_written"``, or ``"nearest"``: what the robot cannot do as written is solved as the
+    nearest motion that it can."""
+    tolerance: Tolerance = field(default=Tolerance(), kw_only=True)  #: of what is solved
     longest: float = field(default=LONGEST, kw_only=True)
-    keys: tuple[Key, ...] = field(default=(), kw_only=True)
-    cursor: float = field(default=0.0, kw_only=True)
+    """How long [s] it may become; a slip of the pen is no motion of a day."""
+    keys: tuple[Key, ...] = field(default=(), kw_only=True)  #: what was written so far
+    cursor: float = field(default=0.0, kw_only=True)  #: when [s] the next call starts
     clock: BeatClock = field(default=BeatClock(), kw_only=True)
+    """What one unit of ``over`` lasts, here and later."""
     shift_beats: float = field(default=0.0, kw_only=True)
+    """How many beats a shift takes with a tempo; 0 without one."""
     counted: tuple[float, ...] = field(default=(), kw_only=True)
-    counted_from: float = field(default=0.0, kw_only=True)
-    last_start: float = field(default=0.0, kw_only=True)
+    """Beats [s] of what was written before the present tempo."""
+    counted_from: float = field(default=0.0, kw_only=True)  #: since when [s] the present one counts
+    last_start: float = field(default=0.0, kw_only=True)  #: when [s] the last call's move starts
     floor: float = field(default=0.0, kw_only=True)
+    """The cursor does not fall behind this time [s] after ``also``."""
 
     _repr_html_ = inline_html
 

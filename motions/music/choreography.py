@@ -50,22 +50,15 @@ class PlacedMove:
 
 @dataclass(frozen=True, slots=True)
 class Dance:
-    """A dance, written.
+    """A dance, written."""
 
-    Attributes:
-        timeline, moves: the motion, which starts with the song, and what is done, in order.
-        accents: what shall happen on the beats, by pulses of the dance.
-        pulses: instants [s] of the pulses in the song; the first one is counted in, without an
-            accent.
-        bar, downbeat: pulses of a bar, and number of the first pulse that begins one.
-    """
-
-    timeline: Timeline
-    moves: tuple[PlacedMove, ...]
-    accents: tuple[Accent, ...]
+    timeline: Timeline  #: the motion, which starts with the song
+    moves: tuple[PlacedMove, ...]  #: what is done, in order
+    accents: tuple[Accent, ...]  #: what shall happen on the beats, by pulses of the dance
     pulses: Float[np.ndarray, " n"]
-    bar: int = 1
-    downbeat: int = 0
+    """Instants [s] of the pulses in the song; the first is counted in, without an accent."""
+    bar: int = 1  #: its pulses
+    downbeat: int = 0  #: number of the first pulse that begins a bar
 
     def time(self, accent: Accent) -> float:
         """When [s] in the song ``accent`` shall happen."""
@@ -281,15 +274,10 @@ NEAR = 0.45  #: Share of a pulse, before and after it, in which its accent is lo
 
 @dataclass(frozen=True, slots=True)
 class DancedAccents:
-    """When the accents of a dance happened.
+    """When the accents of a dance happened."""
 
-    Attributes:
-        wanted: instants [s] in the song on which they should.
-        happened: instants [s] at which they did; nan for one that did not.
-    """
-
-    wanted: Float[np.ndarray, " n"]
-    happened: Float[np.ndarray, " n"]
+    wanted: Float[np.ndarray, " n"]  #: instants [s] in the song on which they should
+    happened: Float[np.ndarray, " n"]  #: at which they did; nan for one that did not
 
     def errors(self, beats: Float[np.ndarray, " k"]) -> Float[np.ndarray, " n"]:
         """How late [s] each accent was after the nearest of ``beats``; nan if it did not happen."""

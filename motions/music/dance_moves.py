@@ -26,27 +26,17 @@ LEAST_LIFT = 0.03  #: Least height [m], whatever the tempo
 
 @dataclass(frozen=True, slots=True)
 class Accent:
-    """Something that shall happen on a beat.
+    """Something that shall happen on a beat."""
 
-    Attributes:
-        pulse: on which pulse, from the start of its move or of the dance.
-        part: a channel of the trunk that turns back, or the foot that touches the ground.
-        sign: 1 where the channel is greatest, -1 where it is least, 0 for a foot.
-    """
-
-    pulse: int
-    part: str
-    sign: int
+    pulse: int  #: on which pulse, from the start of its move or of the dance
+    part: str  #: a channel of the trunk that turns back, or the foot that touches the ground
+    sign: int  #: 1 where the channel is greatest, -1 where it is least, 0 for a foot
 
 
 class Move(ABC):
-    """One move of a dance.
+    """One move of a dance."""
 
-    Attributes:
-        name: what users call it.
-    """
-
-    name: str
+    name: str  #: what users call it
 
     @abstractmethod
     def pulses(self, pulse: float) -> int:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.__main__ import ALIASES, COMMANDS, GONE, main
+from benchmarks.__main__ import COMMANDS, GONE, main
 from benchmarks.behaviour import STUDIES
 from benchmarks.report import WIDTH
 from benchmarks.study import IDEAL, IMU, Study, TrialResult, chosen_studies
@@ -47,14 +47,6 @@ def test_every_benchmark_has_a_help_with_examples(
     assert out.startswith(f"usage: python -m benchmarks {command.name}")
     assert "examples:" in out
     assert max(map(len, out.splitlines())) <= WIDTH
-
-
-@pytest.mark.parametrize(("former", "name"), [a for a in ALIASES.items() if a[1] not in GONE])
-def test_a_former_name_still_runs_the_benchmark(
-    former: str, name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main([former, "--help"]) == ExitCode.OK
-    assert capsys.readouterr().out.startswith(f"usage: python -m benchmarks {name}")
 
 
 def test_what_is_gone_is_told_with_its_place(capsys: pytest.CaptureFixture[str]) -> None:

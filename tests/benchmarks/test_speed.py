@@ -60,26 +60,27 @@ def test_a_tick_is_timed_in_every_mode() -> None:
     assert min(measured("ticks").values()) > 0.0
 
 
-def test_the_worst_tick_of_random_commands_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(speed_ticks, "COMMAND_TIME", 2.0)
-    monkeypatch.setattr(speed_ticks, "TRACED_TICKS", 20)
-    values = measured("commands")
-    assert values["commands.worst"] >= values["commands.p99"] >= 1.0
-    assert values["commands.peak"] > 0.0
-
-
-def test_ticks_on_sensors_with_planned_forces_are_timed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(speed_ticks, "ESTIMATED_TIME", 0.5)
-    monkeypatch.setattr(speed_ticks, "REPEATS", 2)
-    values = measured("estimated")
-    assert values["estimated.worst"] >= values["estimated.p99"] >= 1.0
-
-
-def test_ticks_by_sight_are_timed_without_their_rays(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(speed_ticks, "SIGHT_TIME", 0.5)
-    values = measured("sight")
-    assert values["sight.worst"] >= values["sight.median"] > 0.0
-    assert values["sight.fused"] > 0.0
+@pytest.mark.parametrize(
+    ("name", "cut", "middle", "least", "others"),
+    [
+        ("commands", {"COMMAND_TIME": 2.0, "TRACED_TICKS": 20}, "p99", 1.0, ["peak"]),
+        ("estimated", {"ESTIMATED_TIME": 0.5, "REPEATS": 2}, "p99", 1.0, []),
+        ("sight", {"SIGHT_TIME": 0.5}, "median", 0.0, ["fused"]),
+    ],
+)
+def test_the_worst_tick_is_found(
+    monkeypatch: pytest.MonkeyPatch,
+    name: str,
+    cut: dict[str, float],
+    middle: str,
+    least: float,
+    others: list[str],
+) -> None:
+    for constant, value in cut.items():
+        monkeypatch.setattr(speed_ticks, constant, value)
+    values = measured(name)
+    assert values[f"{name}.worst"] >= values[f"{name}.{middle}"] >= least
+    assert all(values[f"{name}.{other}"] > 0.0 for other in [middle, *others])
 
 
 def test_a_start_is_measured_in_a_process_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
-from typing import TypeVar
+from typing import NoReturn, TypeVar
 
 import numpy as np
 import pytest
@@ -125,6 +125,26 @@ def break_qp(monkeypatch: pytest.MonkeyPatch, is_broken: Callable[[int], bool]) 
         return real(self, snapshot, reference, relax=relax)
 
     monkeypatch.setattr(WholeBodyController, "solve", solve)
+
+
+class Clock:
+    """Stands still unless a test changes ``now``."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def wait_for(event: threading.Event) -> None:
+    assert event.wait(HANG_GUARD)
+
+
+def failing(error: BaseException) -> Callable[..., NoReturn]:
+    def act(*_: object, **__: object) -> NoReturn:
+        raise error
+
+    return act
 
 
 def in_thread(call: Callable[[], _Result]) -> Future[_Result]:

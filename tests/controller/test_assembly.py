@@ -1,7 +1,5 @@
 """A controller is put together whole or not at all."""
 
-import subprocess
-import sys
 import threading
 
 import pytest
@@ -12,7 +10,8 @@ from go2_wbc.config import Config
 from go2_wbc.errors import ConfigError, PlantError
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco import viewer
-from tests.controller.plants import StillPlant
+from tests.controller.plants import StillPlant, failing
+from tests.script_server import python
 
 
 class Window:
@@ -54,11 +53,8 @@ def test_a_plant_that_another_pilot_drives_leaves_no_window_open(window: Window)
 def test_a_pilot_that_cannot_be_made_leaves_no_thread_behind(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def fail(*_: object) -> None:
-        raise RuntimeError("no pilot")
-
     before = threading.active_count()
-    monkeypatch.setattr(assembly, "Pilot", fail)
+    monkeypatch.setattr(assembly, "Pilot", failing(RuntimeError("no pilot")))
     with pytest.raises(RuntimeError, match="no pilot"):
         build_pilot(StillPlant(), Config(), realtime=True)
     assert threading.active_count() == before
@@ -120,5 +116,4 @@ def test_nothing_is_left_to_compile_when_the_robot_has_been_taken_over() -> None
         "assert go2.stand() and go2.walk() and go2.sit()\n"
         "print(sorted(loaded() - before), len(before) > 20)\n"
     )
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert run.stdout.strip() == "[] True"
+    assert python("-c", script).stdout.strip() == "[] True"

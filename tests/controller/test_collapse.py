@@ -66,16 +66,14 @@ def _lean(go2: GO2Controller) -> None:
     go2._runner.run(posture, 2.0)
 
 
-def _walk(go2: GO2Controller) -> None:
-    go2.walk()
-    go2.move(linear_x=0.4)
-    go2.wait(1.0)
+def _walk(go2: GO2Controller, gait: str = "trot", speed: float = 0.4, time: float = 1.0) -> None:
+    go2.walk(gait)
+    go2.move(linear_x=speed)
+    go2.wait(time)
 
 
 def _bound(go2: GO2Controller) -> None:
-    go2.walk("bound")
-    go2.move(linear_x=0.6)
-    go2.wait(1.5)
+    _walk(go2, "bound", 0.6, 1.5)
 
 
 def _wait(go2: GO2Controller) -> None:

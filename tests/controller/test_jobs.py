@@ -3,7 +3,6 @@
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from typing import NoReturn
 
 import pytest
 
@@ -12,7 +11,14 @@ from controller.jobs import Job, JobServer
 from controller.modes import Aborted, Measurements, Outcome
 from go2_wbc.errors import ModeError
 from go2_wbc.robot.state import RobotState
-from tests.controller.plants import HANG_GUARD, in_thread, lying_state
+from tests.controller.plants import (
+    HANG_GUARD,
+    Clock,
+    failing,
+    in_thread,
+    lying_state,
+    wait_for,
+)
 
 PATIENCE = 0.8
 LOOKS = 5000  #: How often, a millisecond apart, a test looks whether a job is prepared
@@ -37,14 +43,6 @@ class Robot:
     def damp(self) -> None:
         self.calls.append("damp")
         self.is_limp.set()
-
-
-class Clock:
-    def __init__(self) -> None:
-        self.now = 100.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 class Client:
@@ -85,17 +83,6 @@ class Client:
             assert self.answered.wait_for(lambda: self.told(name), HANG_GUARD)
         (answer,) = self.told(name)
         return answer
-
-
-def now(event: threading.Event) -> None:
-    assert event.wait(HANG_GUARD)
-
-
-def failing(error: Exception) -> Callable[..., NoReturn]:
-    def act(*_: object) -> NoReturn:
-        raise error
-
-    return act
 
 
 @pytest.fixture
@@ -268,7 +255,7 @@ def test_a_job_is_prepared_in_another_thread_and_carried_out_afterwards(client: 
     goes_on, seen = threading.Event(), []
 
     def prepare() -> None:
-        now(goes_on)
+        wait_for(goes_on)
         seen.append(threading.current_thread().name)
 
     client.submit("nod", lambda _job: seen.append("played") or {}, prepare)
@@ -320,7 +307,7 @@ def test_going_limp_during_the_preparation_keeps_the_job_from_beginning(
     robot: Robot, client: Client
 ) -> None:
     goes_on = threading.Event()
-    client.submit("nod", failing(AssertionError("played")), lambda: now(goes_on))
+    client.submit("nod", failing(AssertionError("played")), lambda: wait_for(goes_on))
     client.jobs.damp()
     goes_on.set()
     worked_off(client)
@@ -362,11 +349,11 @@ def test_going_limp_ends_what_runs_and_refuses_what_waits(robot: Robot, threaded
 
     def act(_job: Job) -> Measurements:
         has_begun.set()
-        now(robot.is_limp)
+        wait_for(robot.is_limp)
         raise Aborted("damped")
 
     threaded.submit("dance", act)
-    now(has_begun)
+    wait_for(has_begun)
     threaded.submit("hello", failing(AssertionError("carried out")))
     threaded.jobs.damp()
     assert threaded.only("hello").is_refused
@@ -385,7 +372,7 @@ def test_a_robot_goes_limp_before_an_action_begins_or_after_never_in_between(
         return ""
 
     def act(_job: Job) -> Measurements:
-        now(robot.is_limp)
+        wait_for(robot.is_limp)
         raise Aborted("damped")
 
     threaded.submit("stand", act, begin=begin)
@@ -418,12 +405,12 @@ def test_a_job_that_outlives_the_server_is_called_off_and_not_answered_again(
 
     def act(job: Job) -> Measurements:
         has_begun.set()
-        now(robot.is_limp)
+        wait_for(robot.is_limp)
         assert job.is_cancelled
         return {}
 
     threaded.submit("dance", act)
-    now(has_begun)
+    wait_for(has_begun)
     threaded.jobs.abandon("the server is ending")
     robot.damp()
     threaded.jobs.abandon("the server is ending", HANG_GUARD)

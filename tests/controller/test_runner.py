@@ -25,9 +25,11 @@ from tests.controller.plants import (
     HANG_GUARD,
     PERIOD,
     StillPlant,
+    failing,
     in_thread,
     interrupt_somewhere_in,
     is_limp,
+    wait_for,
 )
 
 TUCKED_JOINTS = find_profile().tucked_joints
@@ -83,10 +85,6 @@ def close(runner: Runner) -> None:
 def loop_threads() -> set[threading.Thread]:
     """The threads in which loops run, those of other tests included."""
     return {thread for thread in threading.enumerate() if thread.name == "go2-loop"}
-
-
-def wait_for(event: threading.Event) -> None:
-    assert event.wait(HANG_GUARD)
 
 
 # --- without realtime -------------------------------------------------------------------------
@@ -343,8 +341,5 @@ def test_what_is_done_between_ticks_is_done_after_the_end_too(live: Runner) -> N
 def test_closing_a_runner_whose_plant_has_died_does_not_raise(
     runner: Runner, plant: StillPlant
 ) -> None:
-    def fail() -> None:
-        raise PlantTimeout("no answer")
-
-    plant.on_write = fail
+    plant.on_write = failing(PlantTimeout("no answer"))
     close(runner)

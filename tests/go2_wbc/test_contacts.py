@@ -170,7 +170,6 @@ def test_a_gait_is_found_by_its_name_or_is_itself_and_an_unknown_one_told_the_kn
     [
         ({"period": 0.0}, "Gait.period must be positive"),
         ({"apex": 0.0}, "Gait.apex must be positive"),
-        ({"apex": float("nan")}, "Gait.apex must be positive"),
         ({"duty": 1.2}, "Gait.duty must be above 0 and at most 1"),
         ({"offsets": (0.0, 0.5, 1.0, 0.0)}, "Gait.offsets must be four phases"),
         ({"width": 0.0}, "Gait.width must be above 0 and at most 1"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import subprocess
 import sys
 from collections.abc import Iterator
 from importlib import import_module
@@ -14,6 +13,7 @@ import pytest
 
 from go2_wbc import legs, motion_plan, reference
 from go2_wbc.lazy import lazy_exports, without_collecting
+from tests.script_server import python
 
 MODULE = """
 import gc
@@ -45,20 +45,14 @@ def is_collecting(request: pytest.FixtureRequest) -> Iterator[bool]:
     (gc.enable if before else gc.disable)()
 
 
-def test_no_garbage_is_looked_for_during_an_import(
+def test_no_garbage_is_looked_for_during_an_import_and_as_before_after_one_that_fails(
     is_collecting: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = package(tmp_path, f"lazy_package_{is_collecting}", "was_collecting", MODULE)
     monkeypatch.syspath_prepend(tmp_path)
     assert import_module(made).was_collecting is False
     assert gc.isenabled() is is_collecting
-
-
-def test_an_import_that_fails_leaves_the_collector_as_it_was(
-    is_collecting: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
     made = package(tmp_path, f"lazy_failing_{is_collecting}", "Thing", "import no_such_module\n")
-    monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ModuleNotFoundError, match="no_such_module"):
         _ = import_module(made).Thing
     assert gc.isenabled() is is_collecting
@@ -131,5 +125,5 @@ def test_every_public_name_of_a_package_is_found(name: str) -> None:
 def test_a_users_file_that_hides_a_package_is_named(name: str, tmp_path: Path) -> None:
     (tmp_path / f"{name}.py").write_text("")
     code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import go2_wbc"
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert f"{tmp_path / name}.py hides the package {name!r} of go2-wbc: rename it" in run.stderr
+    told = f"{tmp_path / name}.py hides the package {name!r} of go2-wbc: rename it"
+    assert told in python("-c", code).stderr

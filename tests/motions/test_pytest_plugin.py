@@ -1,14 +1,12 @@
 """The pytest plugin: motions are tests, and a failure is a table and no traceback."""
 
-import os
 import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from tests.script_server import ROOT, pytest_with, python
 
 MOTIONS = '''
 from motions import Timeline, deg, motion
@@ -47,15 +45,7 @@ def test_too_far(check_motion):
 
 
 def run_pytest(folder: Path, *args: str) -> subprocess.CompletedProcess[str]:
-    paths = os.pathsep.join([str(ROOT), str(folder)])
-    return subprocess.run(
-        [sys.executable, "-m", "pytest", "-p", "motions.pytest_plugin", "-rA", *args],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": paths, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return pytest_with("motions.pytest_plugin", folder, "-rA", *args)
 
 
 @pytest.fixture
@@ -116,8 +106,7 @@ def test_the_plugin_is_announced_and_loads_nothing_heavy() -> None:
     assert plugins["go2_motions"] == "motions.pytest_plugin"
     assert plugins["go2_certificates"] == "controller.pytest_plugin"
     code = f"import sys, {', '.join(plugins.values())}; print(sorted(sys.modules))"
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
-    )
+    done = python("-c", code)
+    assert "sys" in done.stdout, done.stderr
     for heavy in ("pinocchio", "placo", "mujoco", "numpy", "scipy"):
         assert f"'{heavy}'" not in done.stdout

@@ -1,7 +1,5 @@
 """``import viz`` is cheap, drawing knows no pages, exports refuse a path before the work."""
 
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,9 +8,9 @@ import pytest
 import viz
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
+from tests.script_server import python
 from tests.viz.verdicts import made_up_verdict
 
-ROOT = Path(__file__).resolve().parents[2]
 _EXPORTS: dict[str, Callable[[Recording, Path], Path]] = {
     ".html": lambda recording, path: viz.export_html(recording, path, title="t"),
     ".webp": lambda recording, path: viz.export_animation(recording, path),
@@ -31,7 +29,7 @@ _EXPORTS: dict[str, Callable[[Recording, Path], Path]] = {
 )
 def test_what_is_not_asked_for_is_not_imported(asked: str, absent: str) -> None:
     code = f"import sys; {asked}; sys.exit({absent!r} in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
+    assert python("-c", code).returncode == 0
 
 
 def test_a_name_that_viz_does_not_have_is_an_attribute_error() -> None:

@@ -8,9 +8,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from go2_wbc.errors import MissingDependency, install_line
+from go2_wbc.errors import needing
 
-INSTALL = install_line("ros2")
 BUILD = "ros2/build_interfaces.sh python3 dist && python -m pip install dist/*.whl"
 PROFILE_VARIABLE, JAZZY_PROFILE_VARIABLE = (
     "FASTDDS_DEFAULT_PROFILES_FILE",
@@ -42,12 +41,8 @@ def needed(module: str) -> Any:
     Raises:
         MissingDependency: if it is not installed or does not load; names the install line.
     """
-    try:
+    with needing("ros2", "ROS 2 is not here"):
         return importlib.import_module(module)
-    except ImportError as error:
-        raise MissingDependency(
-            f"ROS 2 is not here ({error}); install the extra: {INSTALL}"
-        ) from error
 
 
 def optional(module: str, name: str) -> Any:

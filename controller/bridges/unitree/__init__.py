@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-from go2_wbc.errors import MissingDependency, install_line
+from go2_wbc.errors import needing
 
 LOOPBACK = "lo0" if sys.platform == "darwin" else "lo"
 """Where simulators live, which need not have a motion switcher; a robot has one."""
@@ -16,9 +16,5 @@ LOOPBACK = "lo0" if sys.platform == "darwin" else "lo"
 
 def require_dds() -> None:
     """Raise MissingDependency, with the install line, unless the DDS library is there and works."""
-    try:
+    with needing("unitree", "Unitree's protocol needs CycloneDDS"):
         importlib.import_module("cyclonedds.core")
-    except ImportError as error:
-        raise MissingDependency(
-            f"Unitree's protocol needs CycloneDDS ({error}): {install_line('unitree')}"
-        ) from error

@@ -204,21 +204,14 @@ STIFFNESS, DAMPING = 1e4, 50.0
 
 @dataclass(frozen=True, slots=True)
 class Push:
-    """An external force that acts for some more physics steps.
+    """An external force that acts for some more physics steps."""
 
-    Attributes:
-        body: id of the body.
-        p_body_point: where it acts, in the body's frame [m].
-        f_world: the force in the world [N]; of what holds the point, its length is the greatest.
-        steps_left: physics steps for which it still acts.
-        p_world_held: where the point is held [m]; None where the force is given.
-    """
-
-    body: int
-    p_body_point: Float[np.ndarray, "3"]
-    f_world: Float[np.ndarray, "3"]
-    steps_left: int
+    body: int  #: its id
+    p_body_point: Float[np.ndarray, "3"]  #: where it acts, in the body's frame [m]
+    f_world: Float[np.ndarray, "3"]  #: in the world [N]; of what holds, the greatest length
+    steps_left: int  #: physics steps for which it still acts
     p_world_held: Float[np.ndarray, "3"] | None = None
+    """Where the point is held [m]; None where the force is given."""
 
 
 @final
@@ -235,7 +228,7 @@ class Pushes:
         f_world = np.array(force, dtype=float)
         if f_world.shape != (3,) or not np.isfinite(f_world).all():
             raise CommandError(f"push force must be three finite numbers [N], got {force!r}")
-        if not 0.0 < duration <= LARGEST:
+        if isinstance(duration, bool) or not 0.0 < duration <= LARGEST:
             raise CommandError(f"push duration must be positive and finite [s], got {duration!r}")
         body, point = self._point(at)
         steps = max(1, round(duration / self._model.opt.timestep))

@@ -73,10 +73,6 @@ class TruthRecording:
         """
         return model.motor.share(self.tau, self._v_before).max(axis=1)
 
-    def asked_shares(self, model: RobotModel) -> Float[np.ndarray, " n"]:
-        """The same of the torques asked for: above 1 where a command was more than motors give."""
-        return model.motor.share(self.tau_asked, self._v_before).max(axis=1)
-
     @property
     def _v_before(self) -> Float[np.ndarray, "n 12"]:
         """Joint velocities [rad/s] at the start of every tick."""

@@ -18,7 +18,7 @@ from controller.jobs import JobServer
 from controller.modes import Mode, Outcome
 from controller.pacing import LogThrottle
 from go2_wbc.config import Config
-from go2_wbc.errors import CommandError, ModeError
+from go2_wbc.errors import CommandError
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.trunk import LEVEL, BodyPose
@@ -77,8 +77,6 @@ def test_an_unknown_order_is_refused_with_the_valid_names() -> None:
 def test_what_did_not_happen_is_answered_with_the_reason() -> None:
     (answer,) = ordered(jobs_of(FakeGo2(refusals={"sit": "sit not done within 3.0 s"})), "sit")
     assert (answer.ok, answer.reason) == (False, "sit not done within 3.0 s")
-    (answer,) = ordered(jobs_of(FakeGo2(errors={"walk": ModeError("fallen: recover")})), "walk")
-    assert (answer.ok, answer.reason) == (False, "fallen: recover")
 
 
 def test_a_robot_that_lies_is_not_taken_over_and_one_that_stands_is(go2: GO2Controller) -> None:
@@ -88,18 +86,6 @@ def test_a_robot_that_lies_is_not_taken_over_and_one_that_stands_is(go2: GO2Cont
     assert go2.mode is Mode.LYING
     assert ordered(jobs_of(go2), "up")[0].ok
     assert ordered(jobs_of(go2), "take_over")[0].ok
-
-
-def test_a_second_order_is_refused_at_once_and_the_first_goes_on() -> None:
-    go2 = FakeGo2()
-    jobs, first, second = jobs_of(go2), [], []
-    order(jobs, "sit", first.append)
-    order(jobs, "up", second.append)
-    assert "busy with 'sit'" in second[0].reason
-    jobs.work()
-    assert first[0].ok
-    assert go2.calls == ["sit"]
-    assert ordered(jobs, "up")[0].ok
 
 
 def test_stop_in_a_motion_leaves_it_and_is_answered_when_the_robot_stands() -> None:

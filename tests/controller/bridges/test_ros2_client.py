@@ -3,7 +3,6 @@
 import json
 import math
 import subprocess
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -13,8 +12,9 @@ import pytest
 
 from go2_wbc.errors import BridgeError, CommandError, ConfigError
 from tests.controller.bridges.processes import Process, wait_until
-from tests.controller.bridges.ros2_graph import ROOT, needs_ros2
+from tests.controller.bridges.ros2_graph import needs_ros2
 from tests.controller.bridges.ros2_probe import WatchingProbe
+from tests.script_server import python
 
 pytestmark = needs_ros2
 
@@ -102,14 +102,7 @@ def test_without_init_the_client_says_what_to_call_first() -> None:
 
 
 def demo(*options: str) -> Done:
-    return subprocess.run(
-        [sys.executable, "-m", "controller.cli.main", "demo", "--ros2", *options],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=180.0,
-        check=False,
-    )
+    return python("-m", "controller.cli.main", "demo", "--ros2", *options)
 
 
 def test_the_demo_runs_over_ros_and_its_figures_come_from_odometry(

@@ -1,8 +1,6 @@
 """Without the extra the bridge says what is missing, and everything else goes on."""
 
 import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
@@ -10,22 +8,14 @@ import controller.bridges.ros2 as bridge
 from controller.cli.common import ExitCode
 from controller.go2_controller import GO2Controller
 from tests.controller.plants import StillPlant, is_limp
-
-ROOT = Path(__file__).resolve().parents[3]
-
+from tests.script_server import python
 
 HIDDEN = "for name in ('rclpy', 'cyclonedds.core'): sys.modules[name] = None"
 
 
 def without_extras(code: str) -> subprocess.CompletedProcess[str]:
     """Run ``code`` in a fresh Python in which there is no rclpy and no CycloneDDS."""
-    return subprocess.run(
-        [sys.executable, "-c", f"import sys\n{HIDDEN}\n{code}"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return python("-c", f"import sys\n{HIDDEN}\n{code}")
 
 
 DRIVE = "unitree-drive --interface lo --domain 1 --i-have-the-remote-in-hand"
@@ -57,7 +47,7 @@ def test_a_name_that_the_bridge_does_not_have_is_an_attribute_error() -> None:
 
 def test_importing_the_bridge_imports_no_ros() -> None:
     code = "import sys, controller.bridges.ros2; sys.exit('rclpy' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
+    assert python("-c", code).returncode == 0
 
 
 def test_what_follows_every_tick_may_make_the_robot_limp_and_follows_nothing_else() -> None:

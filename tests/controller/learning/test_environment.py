@@ -1,8 +1,6 @@
 """Gymnasium's environments: valid by its own checker, reproducible, in physical units."""
 
 import math
-import subprocess
-import sys
 from dataclasses import replace
 from typing import Any
 
@@ -20,6 +18,7 @@ from controller.learning.tasks import WEIGHTS
 from controller.observation import OBSERVATION, RATE, STANCE, TARGETS, TORQUES
 from go2_wbc.errors import CommandError, ModelMismatch
 from go2_wbc.robot.state import JointCommand
+from tests.script_server import python
 
 SETTLED = 0.03
 """Share of the reward that a robot misses that still sinks into its servos, at 6 cm/s."""
@@ -73,7 +72,7 @@ def test_they_are_registered_by_an_import_and_by_the_name_of_the_module() -> Non
         "import gymnasium; env = gymnasium.make('controller.learning:Go2-v0'); "
         "print(env.observation_space.shape)"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    done = python("-c", program)
     assert done.stdout.strip() == f"({OBSERVATION.size},)", done.stderr
 
 
@@ -89,7 +88,7 @@ for use in (lambda: learning.Go2Env(), lambda: learning.record("walk.parquet")):
     except Exception as error:
         print(type(error).__name__, error)
 """
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    done = python("-c", program)
     size, *told = done.stdout.splitlines()
     assert int(size) == OBSERVATION.size, done.stderr
     assert len(told) == 2

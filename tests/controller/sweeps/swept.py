@@ -4,7 +4,6 @@ import math
 import os
 import re
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -107,15 +106,3 @@ def stuck(seed: int) -> dict[str, object]:
 
 def no_row(seed: int) -> object:
     return [seed]
-
-
-def python(*words: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Runs Python anew."""
-    return subprocess.run(
-        [sys.executable, *words],
-        cwd=folder,
-        env={**os.environ, **environment},
-        capture_output=True,
-        text=True,
-        check=False,
-    )

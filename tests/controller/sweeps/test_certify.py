@@ -1,9 +1,6 @@
 """Certificates: counted in random worlds, the same however they are run, and judged by truth."""
 
 import json
-import os
-import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -29,9 +26,9 @@ from go2_wbc.world import DOUBTFUL
 from motions import FeasibilityChecker, Timeline, deg
 from tests.controller.cli.conftest import Run, Said
 from tests.controller.sweeps import swept
+from tests.script_server import pytest_with
 from tests.viz.page_reader import read_data
 
-ROOT = Path(__file__).resolve().parents[3]
 BOW = Timeline(name="bow").body(pitch=deg(8), over=0.4).home(over=0.4)
 MOTIONS = '''
 from motions import Timeline, deg, motion
@@ -186,15 +183,7 @@ def test_the_marker_requires_a_rate_and_says_what_is_missing(tmp_path: Path) -> 
     (tmp_path / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
     (tmp_path / "mine.py").write_text(MOTIONS, encoding="utf-8")
     (tmp_path / "test_mine.py").write_text(TESTS, encoding="utf-8")
-    paths = os.pathsep.join([str(ROOT), str(tmp_path)])
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-p", "controller.pytest_plugin", "-rfE", "test_mine.py"],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": paths, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = pytest_with("controller.pytest_plugin", tmp_path, "-rfE", "test_mine.py")
     assert "'leap' must be done in 90 % of the runs" in done.stdout
     assert "done in 0 of 2 runs" in done.stdout
     assert "got 90" in done.stdout

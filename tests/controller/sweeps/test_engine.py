@@ -14,6 +14,7 @@ from controller import sweep
 from controller.sweeps.engine import Worker, order_of
 from controller.sweeps.sweep_file import Row
 from tests.controller.sweeps import swept
+from tests.script_server import python
 
 HANG_GUARD = 120.0  #: Seconds after which a process that should have ended fails its test
 
@@ -78,7 +79,7 @@ def test_the_module_that_sweeps_is_not_run_again_in_its_workers(tmp_path: Path) 
         f"rows = sweep('{swept.__file__}:trial', 2, workers=1, out='rows.sqlite').rows\n"
         "print(len(rows), 'rows')\n"
     )
-    done = swept.python(script.name, folder=tmp_path)
+    done = python(script.name, folder=tmp_path)
     assert (done.stdout, done.stderr) == ("2 rows\n", "")
 
 
@@ -89,7 +90,7 @@ def test_a_fork_server_with_another_order_of_sets_is_told(tmp_path: Path) -> Non
         "from controller import sweep\n"
         f"sweep('{swept.__file__}:trial', 1, workers=1, out='rows.sqlite')"
     )
-    done = swept.python("-c", code, folder=tmp_path, PYTHONHASHSEED="random")
+    done = python("-c", code, folder=tmp_path, PYTHONHASHSEED="random")
     assert done.returncode == 1
     assert "sets in random order: sweep first" in done.stderr
 

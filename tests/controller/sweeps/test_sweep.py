@@ -18,8 +18,8 @@ from controller.sweeps.sweep_file import Row
 from controller.sweeps.targets import Job, LoadedFunction
 from go2_wbc.errors import CommandError, ConfigError, SweepError
 from tests.controller.sweeps import swept
+from tests.script_server import ROOT, python
 
-ROOT = Path(__file__).resolve().parents[3]
 HANG_GUARD = 120.0  #: Seconds after which a process that should have ended fails its test
 SWEEP = (
     "from controller import sweep; from tests.controller.sweeps import swept; "
@@ -95,7 +95,7 @@ def test_a_changed_file_is_not_mixed_with_what_it_was(tmp_path: Path, out: Path)
     sweep(f"{file}:f", 2, workers=1, out=out)
     file.write_text("def f(seed):\n    return {'x': 2.0 * seed}\n")
     script = f"from controller import sweep; sweep({f'{file}:f'!r}, 4, workers=1, out={str(out)!r})"
-    done = swept.python("-c", script, folder=ROOT)
+    done = python("-c", script)
     assert done.returncode == 1
     assert "depend on something else (content" in done.stderr
     assert [row["x"] for row in read_sweep(out).rows] == [0.0, 1.0]

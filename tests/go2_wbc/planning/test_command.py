@@ -1,23 +1,19 @@
-"""Velocity commands: what is refused, and how the envelope clips."""
+"""Velocity commands: what they are made of, and how the envelope clips."""
 
 import importlib.util
 import math
 import sys
 from types import ModuleType
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from go2_wbc.errors import CommandError
 from go2_wbc.planning import command as command_module
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
 
 ROUNDING = 1e-12  # of a ratio of numbers of order one
-HUGE = pytest.param(10**400, id="an integer beyond every float")
-NAMES = ("linear_x", "linear_y", "angular_z")
 speeds = st.floats(-1e6, 1e6)
 commands = st.builds(VelocityCommand, speeds, speeds, speeds)
 bounds = st.floats(0.1, 5.0)
@@ -45,26 +41,6 @@ def unchecked() -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
-
-
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, np.float32("nan"), HUGE])
-def test_what_is_not_finite_is_refused_by_name(
-    unchecked: ModuleType, name: str, value: float
-) -> None:
-    with pytest.raises(CommandError, match=f"{name} must be finite"):
-        unchecked.VelocityCommand(**{name: value})
-
-
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("value", [True, "0.5", None, [0.1], 1j, np.bool_(True), np.complex128(1)])
-def test_what_is_no_real_number_is_refused_by_name(
-    unchecked: ModuleType,
-    name: str,
-    value: Any,  # noqa: ANN401
-) -> None:
-    with pytest.raises(CommandError, match=f"{name} must be a number, got"):
-        unchecked.VelocityCommand(**{name: value})
 
 
 @pytest.mark.parametrize("value", [1, np.float32(0.5), np.int64(-1), 0.25], ids=repr)

@@ -92,13 +92,6 @@ def test_the_lean_is_integrated_from_the_error_of_the_vertical_while_it_is_known
     np.testing.assert_allclose(target.R_world_base, pin.exp3(np.array([*offset, 0.0])) @ wanted)
 
 
-@pytest.mark.parametrize("name", ["height", "roll", "pitch", "yaw"])
-@pytest.mark.parametrize("value", [math.nan, math.inf])
-def test_a_pose_that_is_not_finite_is_refused_by_name(name: str, value: float) -> None:
-    with pytest.raises(CommandError, match=f"{name} must be finite"):
-        BodyPose(**{name: value})
-
-
 def test_a_pose_beyond_the_envelope_is_refused_with_every_bound_that_it_breaks() -> None:
     envelope = PoseEnvelope(lowest=-0.05, highest=0.01, roll=0.1, pitch=0.2, yaw=0.3)
     envelope.require(BodyPose(-0.05, 0.1, -0.2, 0.3))

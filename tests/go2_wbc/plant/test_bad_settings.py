@@ -17,14 +17,7 @@ from go2_wbc.plant.terrain import Boxes, Patch, Ramp, Slope, Stairs
 from go2_wbc.wbc.config import WbcConfig
 
 refused = {
-    "friction": lambda: MujocoPlant(friction="0.5"),
-    "timestep": lambda: MujocoPlant(timestep=0.0),
-    "payload": lambda: MujocoPlant(payload=-1.0),
-    "initial_yaw": lambda: MujocoPlant(initial_yaw=float("nan")),
     "seed": lambda: MujocoPlant(seed=-1),
-    "terrain": lambda: MujocoPlant(terrain="boxes"),
-    "mjcf": lambda: MujocoPlant(mjcf=3),
-    "urdf": lambda: MujocoPlant(urdf=b"go2.urdf"),
     "height": lambda: Boxes(height=-0.1),
     "size": lambda: Boxes(size=0.0),
     "count": lambda: Stairs(count=0),
@@ -32,7 +25,6 @@ refused = {
     "start": lambda: Ramp(0.2, start=-1.0),
     "length": lambda: Patch(length=float("inf")),
     "position": lambda: SensorNoise(position=-1.0),
-    "WbcConfig.friction": lambda: WbcConfig(friction="a"),
     "WbcConfig.force_weight": lambda: WbcConfig(force_weight=1e-9),
 }
 for name, call in refused.items():

@@ -142,8 +142,6 @@ def test_a_torque_counts_against_what_its_motor_gives_at_the_start_of_the_tick()
     recorded.tau[1:, 4] = 0.25 * model.torque_limits[4]
     assert recorded.torque_shares(model) == pytest.approx([0.0, 0.5, 0.25])
     assert recorded.torque_shares(ideal) == pytest.approx([0.0, 0.25, 0.25])
-    recorded.tau_asked[1:, 4] = 0.75 * model.torque_limits[4]
-    assert recorded.asked_shares(model) == pytest.approx([0.0, 1.5, 0.75])
 
 
 def test_what_a_command_asks_for_is_recorded_beside_what_the_motors_gave() -> None:
@@ -156,4 +154,4 @@ def test_what_a_command_asks_for_is_recorded_beside_what_the_motors_gave() -> No
     np.testing.assert_array_equal(recorded.tau_asked, [np.zeros(12), asked])
     lower, upper = model.motor.limits(before.joint_velocities)
     np.testing.assert_array_equal(recorded.tau[1], np.clip(asked, lower, upper))
-    assert recorded.asked_shares(model)[1] > 2.0
+    assert np.abs(asked / recorded.tau[1]).max() > 2.0

@@ -139,21 +139,15 @@ def test_what_is_not_a_number_is_what_it_was(name: str) -> None:
     assert faults == ()
 
 
-def test_a_jump_of_an_encoder_is_named_and_taken_off() -> None:
+def test_a_jump_of_an_encoder_is_named_and_taken_off_after_a_gap_too() -> None:
     off = STANDING.copy()
     off[4] += 0.1
-    last, faults = watched(*(reading(k, q_joints=STANDING if k < 50 else off) for k in range(60)))
+    readings = [reading(k, q_joints=STANDING if k < 50 else off) for k in range(60)]
+    last, faults = watched(*readings)
     assert [fault.part for fault in faults] == ["FR_thigh_joint"]
     assert faults[0].is_survived
-    assert last.q_joints == pytest.approx(STANDING, abs=1e-6)
-
-
-def test_a_jump_is_taken_off_after_a_gap_too() -> None:
-    off = STANDING.copy()
-    off[4] += 0.1
-    late = replace(reading(60, q_joints=off), time=5.0)
-    last, _ = watched(*(reading(k, q_joints=STANDING if k < 50 else off) for k in range(60)), late)
-    assert last.q_joints == pytest.approx(STANDING, abs=1e-6)
+    for one in (last, watched(*readings, replace(readings[-1], time=5.0))[0]):
+        assert one.q_joints == pytest.approx(STANDING, abs=1e-6)
 
 
 def test_an_encoder_that_stays_while_its_legs_others_do_not_is_stuck() -> None:
@@ -355,16 +349,17 @@ def test_a_gyro_that_drifts_off_is_named_too() -> None:
     assert last.gyro == pytest.approx(np.zeros(3), abs=0.09)
 
 
-def test_a_robot_that_is_struck_has_a_sound_gyro() -> None:
-    """It turns all at once, and its feet as well."""
+@pytest.mark.parametrize("since", [0, 250])
+def test_a_robot_that_turns_or_is_struck_has_a_sound_gyro(since: int) -> None:
+    """Its feet turn about it as the gyro says, if all at once as well."""
     w, v = np.array([0.0, 0.0, 0.6]), np.zeros(12)
     for leg in range(4):
         geometry, q = leg_table(MODEL).geometry[leg], triple(STANDING[3 * leg : 3 * leg + 3])
         place = np.array(plain(leg_motion)(geometry, q, ZERO, ZERO)[0])
         J = np.array([plain(leg_motion)(geometry, q, triple(e), ZERO)[1] for e in np.eye(3)]).T
         v[3 * leg : 3 * leg + 3] = np.linalg.solve(J, -np.cross(w, place))
-    struck = (reading(k, gyro=w, v_joints=v) if k >= 250 else reading(k) for k in range(350))
-    assert watched(*struck)[1] == ()
+    turned = (reading(k, gyro=w, v_joints=v) if k >= since else reading(k) for k in range(350))
+    assert watched(*turned)[1] == ()
 
 
 def test_a_foot_that_slides_is_no_error_of_the_gyro() -> None:
@@ -376,22 +371,6 @@ def test_a_foot_that_slides_is_no_error_of_the_gyro() -> None:
     noisy = [reading(k).v_joints for k in range(200)]
     _, faults = watched(*(reading(k, v_joints=v + noisy[k], tau=tau) for k in range(200)))
     assert [fault.part for fault in faults if fault.part == "gyro"] == []
-
-
-def test_a_robot_that_turns_has_a_sound_gyro() -> None:
-    """Its feet turn about it as the gyro says."""
-    w = np.array([0.0, 0.0, 0.6])
-    legs, turning = leg_table(MODEL).geometry, []
-    for k in range(300):
-        v = np.zeros(12)
-        for leg in range(4):
-            q = triple(STANDING[3 * leg : 3 * leg + 3])
-            place = np.array(plain(leg_motion)(legs[leg], q, ZERO, ZERO)[0])
-            J = np.array([plain(leg_motion)(legs[leg], q, triple(e), ZERO)[1] for e in np.eye(3)]).T
-            v[3 * leg : 3 * leg + 3] = np.linalg.solve(J, -np.cross(w, place))
-        turning.append(reading(k, gyro=w, v_joints=v))
-    _, faults = watched(*turning)
-    assert faults == ()
 
 
 @pytest.mark.parametrize("noise", [1.0, 0.01])

@@ -40,7 +40,7 @@ def hops_round(times: int) -> PhaseProblem:
     for hop in range(times):
         before, after = (ROUND * (hop + step) / times for step in (0, 1))
         up, down = (
-            phase_builders._moved(phase_builders.FOOTPRINT, share, (0.0, 0.0, yaw), z)
+            phase_builders._moved(share, (0.0, 0.0, yaw), z)
             for share, yaw, z in ((1.0, 0.5 * (before + after), 0.12), (1.0, after, 0.0))
         )
         phases += [

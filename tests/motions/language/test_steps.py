@@ -225,8 +225,6 @@ UP = Timeline().foot("FL", z=0.05, over=0.5)
         (lambda: Timeline().step("FL", 60, over=0.5), "x is 60 m, more than 1.5 m"),
         (lambda: Timeline().step("FL", 0.05, over=0.0), "over must be a number above 0"),
         (lambda: Timeline().step("FL", 0.05, over=0.5, height=0.0), "height must be a number"),
-        (lambda: Timeline().step("FL", float("nan"), over=0.5), "x must be a finite number"),
-        (lambda: Timeline().walk(float("inf")), "x must be a finite number, got inf"),
         (lambda: Timeline().walk(500.0), "x is 500 m, more than 20 m"),
         (lambda: Timeline().turn(90), r"turn of 90 rad looks like degrees: write deg\(90\)"),
         (lambda: Timeline().walk(), r"walk\(\) needs x, y or turn: where to; or over"),

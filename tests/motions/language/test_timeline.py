@@ -1,7 +1,5 @@
 """The authoring language: cursor, tracks, joining, mirror images, and what it refuses."""
 
-import subprocess
-import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -20,6 +18,7 @@ from motions.language.timeline_data import SHIFT_TIME
 from motions.plan.quasi_static import FootContacts
 from motions.postures import home_poses
 from tests.motions.plans import MODEL, curves_at, plan_of
+from tests.script_server import python
 
 HOME = home_poses(MODEL)[Posture.STAND]
 EXACT = 1e-9
@@ -192,10 +191,8 @@ NOD = Timeline().body(pitch=0.1, over=0.5)
         (lambda: Timeline().foot("FR", z=1.6, over=1.0), "z is 1.6 m, more than 1.5 m"),
         (lambda: Timeline().bpm(60.0, shift_time=0.0), "shift_time must be a number above 0"),
         (lambda: Timeline().body(over=1.0), "body.. needs one of x, y, z, roll, pitch, yaw"),
-        (lambda: Timeline().body(z=float("nan"), over=1.0), "z must be a finite number, got nan"),
         (lambda: Timeline().body(z=0.1, over=0.0), "over must be a number above 0, got 0.0"),
         (lambda: Timeline().body(z=0.1, over=-1.0), "over must be a number above 0, got -1.0"),
-        (lambda: Timeline().hold(float("inf")), "over must be a number above 0, got inf"),
         (lambda: Timeline().at(-1.0), "at.. needs a time of 0 s or later, got -1.0"),
         (lambda: Timeline().bpm(0.0), "bpm must be a number above 0"),
         (
@@ -236,8 +233,7 @@ for write in ('Timeline().then("bow")', "Timeline().together(7)", 'Timeline(entr
 
 def test_what_has_the_wrong_type_is_refused_with_what_would_be_right() -> None:
     """In a process of its own: here types are checked before that."""
-    run = subprocess.run([sys.executable, "-c", WRONG_TYPES], capture_output=True, text=True)
-    then, together, entry = run.stdout.splitlines()
+    then, together, entry = python("-c", WRONG_TYPES).stdout.splitlines()
     assert then.startswith("TimelineError then() takes timelines, got 'bow'")
     assert then.endswith("load_motion('bow')")
     assert together == "TimelineError together() takes timelines, got 7"

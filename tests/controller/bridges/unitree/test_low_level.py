@@ -24,18 +24,10 @@ from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import quaternion_from_rpy
 from go2_wbc.robot.state import JointCommand, RobotState
-from tests.controller.plants import is_limp, lying_state
+from tests.controller.plants import Clock, is_limp, lying_state
 
 OWN = JointCommand.torque(np.full(12, 1.5))
 TICK = 0.002
-
-
-class Clock:
-    def __init__(self) -> None:
-        self.now = 0.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 def sample(

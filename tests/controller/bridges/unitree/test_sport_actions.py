@@ -23,7 +23,7 @@ from go2_wbc.planning.trunk import LEVEL, BodyPose
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion, motion_names
 from tests.controller.bridges.processes import wait_until
-from tests.controller.plants import HANG_GUARD, lying_state
+from tests.controller.plants import HANG_GUARD, lying_state, wait_for
 
 LEAN = '{"x": 0.1, "y": 0.1, "z": 0.0}'
 
@@ -70,10 +70,6 @@ class Stage:
         """Do something in the middle of an action."""
         self.robot.perform.side_effect = lambda _api: meanwhile()
         self.ask(api)
-
-
-def wait_for(event: threading.Event) -> None:
-    assert event.wait(HANG_GUARD)
 
 
 @pytest.fixture

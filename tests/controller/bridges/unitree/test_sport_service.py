@@ -1,7 +1,6 @@
 """Each call of the sport service does what Unitree's does, or is answered why not."""
 
 import json
-import threading
 import time
 from collections.abc import Iterator
 
@@ -221,28 +220,6 @@ def test_an_action_that_meets_a_long_one_waits_a_while_then_is_refused(at: Watch
     assert at.call(Api.DAMP) == Code.OK
     at.require_lying()
     assert at.now()["error_code"][0] == Code.ACTION_TIMEOUT
-
-
-def test_damp_ends_an_action_whose_caller_hears_that_it_was_not_done(at: WatchedScene) -> None:
-    caller = client_of(at.bus, "sport")
-    codes: list[int] = []
-    call = threading.Thread(target=lambda: codes.append(caller.call(Api.HELLO, timeout=5.0).code))
-    call.start()
-    assert wait_until(lambda: progress(at) == 1, LIMIT)
-    assert at.call(Api.DAMP) == Code.OK
-    call.join(LIMIT)
-    assert codes == [Code.ACTION_TIMEOUT]
-    at.require_lying()
-
-
-def test_damp_wins_against_an_attitude_that_is_still_being_checked(at: WatchedScene) -> None:
-    at.client.send(Api.EULER, '{"x": 0.1, "y": 0.1, "z": 0.0}')
-    assert wait_until(lambda: progress(at) == 1, LIMIT)
-    assert at.call(Api.DAMP) == Code.OK
-    at.require_lying()
-    for _ in passing(at, 1.0):
-        at.require_lying()
-    assert at.mode == SportMode.DAMPING
 
 
 def test_who_has_the_lease_has_the_robot_until_it_ends(at: WatchedScene) -> None:
