@@ -81,10 +81,10 @@ def sag_and_lean(target: Target, now: Snapshot) -> tuple[float, float]:
 
 ASTRAY, STILL = 0.02, 0.3
 """Distance [m] of a foot from where it shall be, and speed [m/s] below which it stays there."""
-LEFT_BEHIND, SLACK = 0.3, 0.1
+LEFT_BEHIND, SLACK = 0.3, 0.15
 """Speed [m/s] at which a held foot is left behind by where it shall be, or all of that's speed if
-it is less, give or take: 0.4 in a trot. One that came late against its joints' friction was left by
-0.2 at most, and one whose knee lay on a slope."""
+it is less, give or take: 0.4 in a trot, 0.1 where a paw comes to rest. One that came late against
+its joints' friction, and one whose knee lay on a slope, were left by less but for 16 ms."""
 
 
 @kernel
