@@ -289,9 +289,15 @@ class StateEstimator:
         )
 
     def _turn_back(self, turn: Array3) -> None:
-        """Take back a turn [rad] in the base frame that was none, and doubt tilt and velocity."""
+        """Take back a turn [rad] in the base frame that was none, and doubt tilt and velocity.
+
+        Also what of the accelerometer's bias has hidden it: left there, it would turn it back.
+        """
         R = pin.Quaternion(self._x.quaternion).toRotationMatrix() @ pin.exp3(-turn)
         self._x.quaternion[:] = pin.Quaternion(R).coeffs()
+        if turn.any():
+            usual = self._config.accelerometer_bias
+            self._x.force_bias[:] = self._x.force_bias.clip(-usual, usual)
         for first, count, deviation in _AFTER_GYRO if turn.any() else _AFTER_FORCE:
             doubted = range(first, first + count)
             self._P[doubted, doubted] += deviation**2

@@ -66,6 +66,9 @@ this share of what it was: what a blow leaves fades."""
 UPWARDS, UPWARDS_LASTS = 0.85, 0.1
 """Share of it by which it points up or down, and how long [s] it lasts then: feet slide sideways,
 and a trot that believes it rises falls soon. Of sound ones 0.05 at most."""
+UPSET = 3.0
+"""Time [s] after a throw in which a sideways error of the accelerometer is a tilt, too: a trunk
+that slid at 3 m/s on all its feet was believed to lean by 3 deg for two seconds more."""
 STRUCK = 0.3
 """Time [s] after a foot has borne more than the robot's weight: an error that begins then has to
 last as long as any other: where commands act late, and on waves, robots land so hard, their feet
@@ -87,6 +90,7 @@ class WatchedImu(Record):
     stood: float  #: for how long its legs have carried it [s]
     unborne: float  #: for how long they have not [s]
     struck: float  #: for how long yet a foot counts as struck [s]
+    upset: float  #: for how long yet the trunk counts as thrown [s]
     turning: Array3x3  #: matrix of the normal equations of the gyro's error,
     turned: Array3  #: their right side,
     residual: float  #: and the squared residual
@@ -299,9 +303,9 @@ def judge_accelerometer(
         lasts = TILT_LASTS
     if m.force_time > lasts and m.gyro_time == 0.0:
         m.force_time, m.is_found = 0.0, 1.0
-        if is_tilt:
-            by = cross(up, triple(m.excess))
-            put(plus_scaled((0.0, 0.0, 0.0), 1.0 / (TILT_SHARE * gravity), by), m.turn)
+        if is_tilt or (m.upset > 0.0 and not is_upwards):
+            by, measured = cross(up, triple(m.excess)), TILT_SHARE if is_tilt else 1.0
+            put(plus_scaled((0.0, 0.0, 0.0), 1.0 / (measured * gravity), by), m.turn)
         else:
             m.force_is_off = 1.0
             for k in range(3):

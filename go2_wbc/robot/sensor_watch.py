@@ -32,6 +32,7 @@ from go2_wbc.robot.imu_watch import (
     SHAKEN,
     STRUCK,
     THROWN,
+    UPSET,
     WatchedImu,
     judge_accelerometer,
     judge_gyro,
@@ -301,7 +302,9 @@ def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt:
     note_push(m, push, triple(r.accelerometer), dt)
     is_up = up[2] > UPRIGHT
     is_borne = is_up and borne.sum() > CARRIED * c.weight
-    is_told = dot(moved, moved) < THROWN**2 and noise_of_gyro(s.speed_noise) == 0.0
+    is_thrown = dot(moved, moved) > THROWN**2
+    m.upset = UPSET if is_thrown else max(m.upset - dt, 0.0)
+    is_told = not is_thrown and noise_of_gyro(s.speed_noise) == 0.0
     note_bearing(m, is_up and is_told, is_borne, dt)
     for leg in range(4):
         watch_force(s, r, leg, borne[leg], slack[leg], is_borne, dt)

@@ -194,6 +194,7 @@ def test_a_turn_that_was_none_is_taken_back_and_what_it_touched_is_doubted(turn:
     estimator = StateEstimator(RobotModel())
     estimator.update(reading(0.0))
     x, P = estimator._state.filter.x, estimator._state.filter.P
+    x.force_bias[:] = 0.04, -0.5, 0.0  # the latter has hidden the tilt, and would turn it back
     before = np.array(P)
     estimator._turn_back(np.array([turn, 0.0, 0.0]))
     doubted = np.zeros(len(P))
@@ -203,6 +204,7 @@ def test_a_turn_that_was_none_is_taken_back_and_what_it_touched_is_doubted(turn:
     np.testing.assert_allclose(P - before, np.diag(doubted), atol=ROUNDING)
     roll = 2.0 * np.arctan2(x.quaternion[0], x.quaternion[3])
     assert roll == pytest.approx(-turn, abs=1e-9)
+    assert x.force_bias == pytest.approx([0.04, -0.05 if turn else -0.5, 0.0])
 
 
 def after_a_start(speed: float, accelerometer: list[float], forces: float) -> list[RobotState]:

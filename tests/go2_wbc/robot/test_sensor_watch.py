@@ -279,6 +279,21 @@ def test_a_blow_is_no_error_of_the_accelerometer() -> None:
     assert faults == ()
 
 
+@pytest.mark.parametrize("thrown", [True, False])
+def test_what_a_sound_accelerometer_lacks_after_a_throw_is_a_tilt(thrown: bool) -> None:
+    # A robot slid over slippery ground, was believed to lean, and its accelerometer was named.
+    watch, turns = SensorWatch(MODEL), []
+    blow, off = np.array([0.0, 40.0, 9.81]), np.array([0.6, 0.0, 9.79])
+    for k in range(1000):
+        is_blow = thrown and 50 <= k < 60
+        changed = {"accelerometer": off} if k >= 60 else {"accelerometer": blow} if is_blow else {}
+        watch.checked(reading(k, **changed), LEVEL)
+        if watch.misturned is not None:
+            turns.append(watch.misturned)
+    assert [fault.part for fault in watch.faults] == ([] if thrown else ["accelerometer"])
+    assert turns[0] == pytest.approx([0.0, 0.6 / 9.81 if thrown else 0.0, 0.0], abs=0.015)
+
+
 @pytest.mark.parametrize(("lack", "is_off"), [(0.0, 0.0), (-1.0, 1.0)])
 def test_what_legs_push_by_is_felt_and_an_error_is_what_they_lack(
     lack: float, is_off: float
