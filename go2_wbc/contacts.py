@@ -54,15 +54,22 @@ class ContactPhase:
 @typed()
 @dataclass(frozen=True, slots=True)
 class ContactSchedule:
-    """Events in increasing order: from ``times[i]`` on, the feet ``modes[i]`` are in stance."""
+    """Events in increasing order: from ``times[i]`` on, the feet ``modes[i]`` are in stance.
 
-    times: tuple[float, ...]  #: of the events [s]; the first is the start (0 if it is periodic)
-    modes: Bool[np.ndarray, "n 4"]  #: feet in stance from each event on
-    period: float | None = None  #: seconds after which a gait repeats, or None
+    Attributes:
+        times: event times [s]; ``times[0]`` is the start (0 for a periodic schedule).
+        modes: (n, 4) feet in stance from each event on.
+        period: seconds after which a gait repeats, or None.
+        since: (n, 4) when each foot's contact changed last, between an event and the next [s];
+            -inf if never.
+        until: (n, 4) when it changes next [s]; inf if never.
+    """
+
+    times: tuple[float, ...]
+    modes: Bool[np.ndarray, "n 4"]
+    period: float | None = None
     since: Float[np.ndarray, "n 4"] = field(init=False, repr=False)
-    """When each foot's contact changed last, between an event and the next [s]; -inf if never."""
     until: Float[np.ndarray, "n 4"] = field(init=False, repr=False)
-    """When it changes next [s]; inf if never."""
 
     __repr__ = brief
 
@@ -124,13 +131,19 @@ class Stride:
     Those of a slow trot are as long as they can be: the way of the feet up and down costs the same
     energy each time. At 0.5 m/s a trot of 0.33 s took 1.07 of its weight times its way, this one of
     0.40 s 0.74 (on sensors, in the mean of three seeds).
+
+    Attributes:
+        reach: way [m] of the trunk over a standing foot.
+        stance_min, stance_max: bounds [s] of the time that a foot stands.
+        swing: time [s] of the swing at 1 m/s.
+        swing_slope: what each m/s more adds to it [s^2/m].
     """
 
-    reach: float = 0.20  #: way [m] of the trunk over a standing foot
-    stance_min: float = 0.08  #: bounds [s] of the time that a foot stands
+    reach: float = 0.20
+    stance_min: float = 0.08
     stance_max: float = 0.20
-    swing: float = 0.20  #: time [s] of the swing at 1 m/s
-    swing_slope: float = 0.01  #: what each m/s more adds to it [s^2/m]
+    swing: float = 0.20
+    swing_slope: float = 0.01
 
     def __post_init__(self) -> None:
         """Raise ConfigError for bounds or a swing that leave no stride."""

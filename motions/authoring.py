@@ -107,12 +107,18 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """A motion that can be made with other parameters."""
+    """A motion that can be made with other parameters.
 
-    name: str  #: what users call it
-    summary: str  #: the first line of its docstring
-    parameters: tuple[Parameter, ...]  #: what can be chosen
-    source: str  #: file and line where it is written
+    Attributes:
+        name, summary: what users call it, and the first line of its docstring.
+        parameters: what can be chosen.
+        source: file and line where it is written.
+    """
+
+    name: str
+    summary: str
+    parameters: tuple[Parameter, ...]
+    source: str
     _make: Callable[..., Timeline]
 
     def __repr__(self) -> str:

@@ -23,16 +23,25 @@ _LEAST_SAMPLES = 2
 @typed()
 @dataclass(frozen=True, slots=True)
 class MarginCurve:
-    """What is left to one limit over time: the least of all its subjects."""
+    """What is left to one limit over time: the least of all its subjects.
 
-    name: str  #: of the limit
-    unit: str  #: of the margin
-    time: Float[np.ndarray, " n"]  #: seconds after the start
+    Attributes:
+        name: of the limit.
+        unit: of the margin.
+        time: (n,) seconds after the start.
+        margin: (n,) negative where the limit is broken, nan where there is nothing to judge.
+        subjects: what is judged.
+        worst: (n,) which subject has the least margin, a row of ``subjects``.
+        tight: a margin below it deserves a warning.
+    """
+
+    name: str
+    unit: str
+    time: Float[np.ndarray, " n"]
     margin: Float[np.ndarray, " n"]
-    """Negative where the limit is broken, nan where there is nothing to judge."""
-    subjects: tuple[str, ...]  #: what is judged
-    worst: Int[np.ndarray, " n"]  #: which of ``subjects`` has the least margin
-    tight: float | int = 0.0  #: a margin below it deserves a warning
+    subjects: tuple[str, ...]
+    worst: Int[np.ndarray, " n"]
+    tight: float | int = 0.0
 
     __repr__ = brief
 
@@ -51,15 +60,23 @@ class MarginCurve:
 @typed()
 @dataclass(frozen=True, slots=True)
 class Annotation:
-    """A limit that one subject breaks, or nearly does."""
+    """A limit that one subject breaks, or nearly does.
 
-    limit: str  #: its name
-    subject: str  #: joint, foot or part of the body
-    time: float  #: when [s] it is worst
-    text: str  #: value and limit in words
-    is_broken: bool  #: otherwise the margin is only tight
-    spans: tuple[tuple[float, float], ...]  #: start and end [s] of each stretch of it
-    parts: tuple[str, ...]  #: links that are concerned, as ``FL_calf``, or ``CENTRE_OF_MASS``
+    Attributes:
+        limit, subject, time: its name; joint, foot or part of the body; when [s] it is worst.
+        text: value and limit in words.
+        is_broken: otherwise the margin is only tight.
+        spans: start and end [s] of each stretch in which it is so.
+        parts: links that are concerned, such as ``FL_calf``, or ``CENTRE_OF_MASS``.
+    """
+
+    limit: str
+    subject: str
+    time: float
+    text: str
+    is_broken: bool
+    spans: tuple[tuple[float, float], ...]
+    parts: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,15 +106,25 @@ class CertifiedRate:
 @typed()
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What a check says of a movement."""
+    """What a check says of a movement.
 
-    ok: bool  #: no limit is broken
-    text: str  #: the verdict in a few words
-    annotations: tuple[Annotation, ...]  #: the broken limits, then the tight ones
-    curves: tuple[MarginCurve, ...]  #: the margin of every limit
-    chance: float | None = None  #: that it is done, 0 to 1; None if nothing is said of it
-    world: str = ""  #: in which all this holds, in words
-    certified: CertifiedRate | None = None  #: how often it was done in randomised runs
+    Attributes:
+        ok: no limit is broken.
+        text: the verdict in a few words.
+        annotations: the broken limits, then the tight ones.
+        curves: the margin of every limit.
+        chance: that the movement is done, 0 to 1; None if nothing is said of it.
+        world: in which all this holds, in words.
+        certified: how often it was done in randomised runs.
+    """
+
+    ok: bool
+    text: str
+    annotations: tuple[Annotation, ...]
+    curves: tuple[MarginCurve, ...]
+    chance: float | None = None
+    world: str = ""
+    certified: CertifiedRate | None = None
 
     __repr__ = brief
 
@@ -123,27 +150,36 @@ class Slider:
 @typed()
 @dataclass(frozen=True, slots=True)
 class ReplayContent:
-    """What to show."""
+    """What to show.
 
-    recording: Recording  #: the movement of the solid robot
-    is_plan: bool = False  #: it is a plan; otherwise it was measured
-    verdict: Verdict | None = None  #: what to say about the motion
+    Attributes:
+        recording: the movement of the solid robot.
+        is_plan: it is a plan; otherwise it was measured.
+        verdict: what to say about the motion.
+        ghost: the plan of what was measured, shown translucent; its clock starts with the
+            recording's, and the verdict is on it.
+        written: what was written, where the plan is only the nearest to it; shown translucent in
+            another colour. Of its forces, torques and margins nothing is shown.
+        beats: instants [s] that the motion counts in, drawn as a ruler.
+        sliders: parameters that a live page lets one choose.
+        sound: an MP3 file that starts with the recording, played in step with it; empty for none.
+        end_pose: where the movement shall end: x, y [m] and yaw [rad] of the frame of the feet.
+        bar: beats of a bar, and the number of the beat on which the first begins.
+        editor: what a page that edits the motion's file shows of it, as for JSON; see
+            ``controller.studio``.
+    """
+
+    recording: Recording
+    is_plan: bool = False
+    verdict: Verdict | None = None
     ghost: Recording | None = None
-    """The plan of what was measured, shown translucent; its clock starts with the recording's, and
-    the verdict is on it."""
     written: Recording | None = None
-    """What was written, where the plan is only the nearest to it; shown translucent in another
-    colour. Of its forces, torques and margins nothing is shown."""
-    beats: tuple[float, ...] = ()  #: instants [s] that the motion counts in, drawn as a ruler
-    sliders: tuple[Slider, ...] = ()  #: parameters that a live page lets one choose
+    beats: tuple[float, ...] = ()
+    sliders: tuple[Slider, ...] = ()
     sound: bytes = b""
-    """An MP3 file that starts with the recording, played in step with it; empty for none."""
     end_pose: tuple[float, float, float] | None = None
-    """Where the movement shall end, x, y [m] and yaw [rad] of the frame of the feet."""
-    bar: tuple[int, int] = (4, 0)  #: its beats, and the number of that on which the first begins
+    bar: tuple[int, int] = (4, 0)
     editor: Mapping[str, object] | None = None
-    """What a page that edits the motion's file shows of it, as for JSON; see
-    ``controller.studio``."""
 
     __repr__ = brief
 

@@ -64,11 +64,17 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What the probe makes of a sidecar."""
+    """What the probe makes of a sidecar.
 
-    mark: float  #: of the run as the sidecar says; smaller is better
-    best: float  #: of the run that was best
-    change: Change | None  #: what is then changed; None if nothing is found to be wrong
+    Attributes:
+        mark: of the run as the sidecar says; smaller is better.
+        best: of the run that was best.
+        change: what is then changed; None if nothing is found to be wrong.
+    """
+
+    mark: float
+    best: float
+    change: Change | None
 
     __repr__ = brief
 

@@ -38,15 +38,23 @@ _HOLDS_FOR = ("version", "code", "plan", "libraries", "python")
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """How often a motion was done."""
+    """How often a motion was done.
 
-    motion: str  #: its name
-    n: int  #: runs that were looked at
-    done: int  #: those in which it was done
-    interval: tuple[float, float]  #: of 95 % of the true rate
-    worst: tuple[Row, ...]  #: rows in ``path`` of the worst runs, the worst first
-    about: Mapping[str, str]  #: what it holds for, versions and digests of code and plan
-    path: Path  #: the file with all rows; each can be replayed
+    Attributes:
+        motion, n, done: its name, runs that were looked at, and in which it was done.
+        interval: of 95 % of the true rate.
+        worst: the worst runs, the worst first: their rows in ``path``.
+        about: what the certificate holds for: versions, and digests of code and plan.
+        path: the file with all rows; each can be replayed.
+    """
+
+    motion: str
+    n: int
+    done: int
+    interval: tuple[float, float]
+    worst: tuple[Row, ...]
+    about: Mapping[str, str]
+    path: Path
 
     __repr__ = brief
 

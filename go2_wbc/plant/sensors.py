@@ -23,11 +23,17 @@ for unknown."""
 
 @dataclass(frozen=True, slots=True)
 class ImuSample:
-    """One reading of the inertial measurement unit, in the IMU's frame (axes as the base's)."""
+    """One reading of the inertial measurement unit, in the IMU's frame (axes as the base's).
 
-    quaternion: Float[np.ndarray, "4"]  #: orientation of the IMU in the world, x y z w
-    gyro: Float[np.ndarray, "3"]  #: angular velocity [rad/s]
-    accelerometer: Float[np.ndarray, "3"]  #: specific force [m/s^2]; at rest +9.81 upwards
+    Attributes:
+        quaternion: orientation of the IMU in the world, x y z w.
+        gyro: angular velocity [rad/s].
+        accelerometer: specific force [m/s^2]; a robot at rest reads +9.81 upwards.
+    """
+
+    quaternion: Float[np.ndarray, "4"]
+    gyro: Float[np.ndarray, "3"]
+    accelerometer: Float[np.ndarray, "3"]
 
     __repr__ = brief
 

@@ -68,11 +68,17 @@ near the speed without load; own choice."""
 
 @dataclass(frozen=True, slots=True)
 class MotorModel:
-    """Torques that the twelve motors can give, in the order of ``JOINT_NAMES``."""
+    """Torques that the twelve motors can give, in the order of ``JOINT_NAMES``.
 
-    peak: Array12  #: torque limits [N m] up to the knee, and of a braking motor
-    knee_speed: Array12  #: speeds [rad/s] from which the torque of a driving motor falls
-    no_load_speed: Array12  #: speeds [rad/s] at which it is gone; infinite for an ideal motor
+    Attributes:
+        peak: torque limits [N m] up to the knee, and of a braking motor.
+        knee_speed: speeds [rad/s] from which the torque of a driving motor falls.
+        no_load_speed: speeds [rad/s] at which it is gone; infinite for an ideal motor.
+    """
+
+    peak: Array12
+    knee_speed: Array12
+    no_load_speed: Array12
 
     @staticmethod
     def named(name: str, description: RobotDescription) -> MotorModel:

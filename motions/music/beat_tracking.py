@@ -55,18 +55,27 @@ Times = Float[np.ndarray, " k"]
 
 @dataclass(frozen=True, slots=True)
 class Beats:
-    """The beats of a song."""
+    """The beats of a song.
 
-    tempo: float  #: mean tempo [beats/min]
-    times: Times  #: instants [s] of the beats, from the start of the file
-    strengths: Times  #: how strongly notes begin there, 1 for the strongest
-    duration: float  #: length [s] of the song
+    Attributes:
+        tempo: mean tempo [beats/min].
+        times: instants [s] of the beats, from the start of the file.
+        strengths: how strongly notes begin there, 1 for the strongest.
+        duration: length [s] of the song.
+        agreement: how regular it is: its mean correlation with itself 1 to 8 beats later, at
+            most 1.
+        metre: beats of a bar, 3 for a waltz, 6 for one that is counted twice as fast; 1 where no
+            bars are known.
+        downbeat: number of the beat, from 0, on which the first bar begins.
+    """
+
+    tempo: float
+    times: Times
+    strengths: Times
+    duration: float
     agreement: float
-    """How regular it is, its mean correlation with itself 1 to 8 beats later, at most 1."""
     metre: int = 1
-    """Beats of a bar, 3 for a waltz, 6 for one that is counted twice as fast; 1 where no bars are
-    known."""
-    downbeat: int = 0  #: number of the beat, from 0, on which the first bar begins
+    downbeat: int = 0
 
     __repr__ = brief
 

@@ -50,15 +50,22 @@ class PlacedMove:
 
 @dataclass(frozen=True, slots=True)
 class Dance:
-    """A dance, written."""
+    """A dance, written.
 
-    timeline: Timeline  #: the motion, which starts with the song
-    moves: tuple[PlacedMove, ...]  #: what is done, in order
-    accents: tuple[Accent, ...]  #: what shall happen on the beats, by pulses of the dance
+    Attributes:
+        timeline, moves: the motion, which starts with the song, and what is done, in order.
+        accents: what shall happen on the beats, by pulses of the dance.
+        pulses: instants [s] of the pulses in the song; the first one is counted in, without an
+            accent.
+        bar, downbeat: pulses of a bar, and number of the first pulse that begins one.
+    """
+
+    timeline: Timeline
+    moves: tuple[PlacedMove, ...]
+    accents: tuple[Accent, ...]
     pulses: Float[np.ndarray, " n"]
-    """Instants [s] of the pulses in the song; the first is counted in, without an accent."""
-    bar: int = 1  #: its pulses
-    downbeat: int = 0  #: number of the first pulse that begins a bar
+    bar: int = 1
+    downbeat: int = 0
 
     def time(self, accent: Accent) -> float:
         """When [s] in the song ``accent`` shall happen."""

@@ -79,12 +79,17 @@ def mp3_of(sound: Sound) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Song:
-    """A sound with its beats."""
+    """A sound with its beats.
 
-    name: str  #: for a person
-    samples: Sound  #: amplitudes from -1 to 1
-    rate: int  #: samples per second
-    beats: Float[np.ndarray, " k"]  #: instants [s] of its beats
+    Attributes:
+        name, samples, rate: for a person; amplitudes from -1 to 1; samples per second.
+        beats: instants [s] of its beats.
+    """
+
+    name: str
+    samples: Sound
+    rate: int
+    beats: Float[np.ndarray, " k"]
 
     @property
     def duration(self) -> float:

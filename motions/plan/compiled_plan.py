@@ -234,25 +234,34 @@ class PlanSamples(Wanted):
 
 @dataclass(frozen=True, slots=True)
 class CompiledPlan(MotionPlan):
-    """A timeline, ready to be played."""
+    """A timeline, ready to be played.
+
+    Attributes:
+        name, entry, exit: see ``MotionPlan``.
+        curves: cubics of CoM [m], roll, pitch, yaw [rad], the twelve joints [rad] and the places of
+            the four feet's centres [m]: (30,).
+        contacts: who stands when.
+        swings: (m, 4) at each event of ``contacts``, the feet in the air that follow their places;
+            the others in the air follow their joints.
+        ramp: time [s] over which a foot is unloaded before lift-off and loaded after touchdown.
+        problems: what could not be done as written.
+        spans, beats: start and end [s] of the named holds, and instants [s] that it counts in.
+        dynamic: its parts that obey the whole robot's dynamics.
+        held: by the names of spans, the foot that must be held up then; see ``held_feet``.
+    """
 
     name: str
     entry: Posture
     exit: Posture
     curves: PPoly
-    """Cubics of CoM [m], roll, pitch, yaw [rad], the twelve joints [rad] and the places of the four
-    feet's centres [m]: (30,)."""
-    contacts: ContactSchedule  #: who stands when
+    contacts: ContactSchedule
     swings: Bool[np.ndarray, "m 4"]
-    """At each event of ``contacts``, the feet in the air that follow their places; the others in
-    the air follow their joints."""
-    ramp: float  #: time [s] in which a foot is unloaded before lift-off, loaded after touchdown
-    problems: tuple[Problem, ...]  #: what could not be done as written
-    spans: Mapping[str, tuple[float, float]]  #: start and end [s] of the named holds
-    beats: tuple[float, ...] = ()  #: instants [s] that it counts in
-    dynamic: tuple[DynamicSpan, ...] = ()  #: its parts that obey the whole robot's dynamics
+    ramp: float
+    problems: tuple[Problem, ...]
+    spans: Mapping[str, tuple[float, float]]
+    beats: tuple[float, ...] = ()
+    dynamic: tuple[DynamicSpan, ...] = ()
     held: Mapping[str, Leg] = field(default_factory=dict)
-    """By the names of spans, the foot that must be held up then; see ``held_feet``."""
     _asked: PlanCurves = field(init=False, repr=False)
 
     _repr_html_ = inline_html
