@@ -9,7 +9,7 @@ from controller.studio import session
 from controller.studio.plain import LOOKED_FOR, NO_WAY
 from controller.studio.session import Studio
 from go2_wbc.robot.model import RobotModel
-from motions import Timeline
+from motions import FeasibilityChecker, Timeline
 from motions.dynamics.phases import PhaseProblem
 from motions.dynamics.plan_audit import PlanLimits
 from motions.dynamics.plan_cache import _key, plan_folder
@@ -18,6 +18,7 @@ from tests.viz.page_reader import read_message, read_pack
 
 HIGH, LOW = 0.2961, 0.0931  # m; too high for the robot, and not
 SHORT = 0.3  # s of work that a jump is looked for here: what is too high takes longer
+KNOWN = 0.1  # m; one whose plan is kept from an earlier time
 LEAP = '''from motions import Timeline, motion
 
 
@@ -27,6 +28,11 @@ def leap() -> Timeline:
     line = Timeline().body(z=-0.02, over=0.6).home(over=0.6)
     return line.jump(height={height}).hold(0.5).jump(height=0.1).hold(0.5)
 '''
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _known() -> None:
+    FeasibilityChecker().plan(Timeline().jump(height=KNOWN))
 
 
 def _page(studio: Studio) -> dict[str, Any]:
