@@ -32,9 +32,6 @@ from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import Posture
 
 RADIANS = frozenset({"deg", "radians", "deg2rad"})  #: Functions that take degrees
-ARRAYS = frozenset(
-    {"array", "asarray", "list", "tuple"}
-)  #: Functions that have what they are given
 MEMBERS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "Posture": tuple(one.name for one in Posture),
@@ -44,7 +41,7 @@ MEMBERS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 """Words that are written as members, such as ``Posture.SIT``."""
 DEEPEST = 6  #: Names of names that are followed
-MOST_NAMES = 100  #: that one argument may lead to: two may stand for each other
+MOST_STEPS = 100  #: from name to name, of one argument: a field may stand for itself
 COMPUTED = "it is computed: change it in the file"
 _SCOPES = (ast.FunctionDef, ast.Lambda, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 
@@ -112,7 +109,7 @@ class _Bound:
 
 class _Finder:
     def __init__(self, syntax: Syntax) -> None:
-        self._syntax, self._names = syntax, 0
+        self._syntax, self._steps = syntax, 0
 
     def found(self, node: ast.expr, call: ast.AST, run: Run, depth: int) -> list[Literal]:
         """See ``literals``."""
@@ -158,6 +155,9 @@ class _Finder:
         Raises:
             StudioError: if that cannot be told; says why.
         """
+        self._steps += isinstance(node, ast.Name | ast.Subscript | ast.Attribute)
+        if self._steps > MOST_STEPS:
+            raise StudioError(COMPUTED)
         if isinstance(node, ast.Name):
             return self.bound(node, call, run)
         if isinstance(node, ast.NamedExpr):
@@ -189,16 +189,11 @@ class _Finder:
         return None
 
     def _key(self, node: ast.expr, call: ast.AST, run: Run) -> float | str | None:
-        while isinstance(node, ast.Name):
-            there = self.bound(node, call, run)
-            node, call, run = there.node, there.call, there.run
-        return value_of(node)
+        return value_of(self.end_of(node, call, run).node)
 
     def bound(self, name: ast.Name, call: ast.AST, run: Run) -> _Bound:
         """What a name stands for: its only value, a parameter's, an element of a loop."""
-        syntax, self._names = self._syntax, self._names + 1
-        if self._names > MOST_NAMES:
-            raise StudioError(COMPUTED)
+        syntax = self._syntax
         functions = [one for one in syntax.around(call) if isinstance(one, ast.FunctionDef)]
         for number, function in enumerate(functions):
             own = run if number == 0 else Run()
