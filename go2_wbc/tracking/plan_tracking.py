@@ -44,6 +44,7 @@ from go2_wbc.robot.rotations import log_rotation, rotation_from_quaternion, yaw_
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.tracking.landing import Landing, Landings, land
 from go2_wbc.tracking.plan_curves import StanceLoad
+from go2_wbc.tracking.trunk_firmness import hold_firmly
 
 PAIR = 2  #: Feet that hold a trunk along the line between them, and not across it
 HEIGHT_PER_WEIGHT = 0.00055
@@ -72,6 +73,7 @@ class Correction(Record):
     """What the offset would have to do against the payload that is known, in the heading frame:
     upward [m], about the axis ahead and the one aside [rad]."""
     knows_payload: bool  #: whether ``carried`` has been found yet
+    friction: Array6  #: what is learned of it, see ``trunk_firmness``
 
 
 class Tracking(Record):
@@ -175,6 +177,12 @@ def follow(
     note(now, error, s, target)
     is_held = standing_feet(target) > PAIR
     correct(now, error, dt if is_held else 0.0, s.correction, target)
+    if is_held and target.force_weight == 0.0:  # else solved, with forces of its own
+        c = s.correction
+        lead = hold_firmly(now, error, c.offset, dt, c.friction, target)
+        for i in range(3):
+            target.p_world[i] += lead[i]
+        turn_by((lead[3], lead[4], lead[5]), target.R_world_base)
 
 
 @subroutine

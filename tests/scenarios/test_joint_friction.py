@@ -11,10 +11,12 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.model import JointDynamics
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import JointFriction
+from go2_wbc.robot.rotations import rpy_from_quaternion
 from motions import Timeline
 from motions.language.timeline import deg
 
 ROLL_ERROR = np.radians(1.5)
+SMALL, SMALL_ERROR = 1.0, 0.2  # [deg]
 HEIGHT_ERROR = 0.010  # [m]
 PAW_ERROR = 0.008  # [m]
 GYM_QUADRUPED = JointDynamics(
@@ -75,6 +77,38 @@ def test_a_roll_and_back_is_done_and_ends_where_it_was_asked_to(angle: float) ->
         assert recording.time[states[0]] >= start
         assert np.abs(held - np.radians(angle)).max() < ROLL_ERROR
         assert abs(go2.state.rpy[0]) < ROLL_ERROR
+
+
+@pytest.mark.parametrize("friction", [0.0, 1.0, 1.5])
+@pytest.mark.parametrize("channel", ["roll", "pitch", "yaw"])
+def test_a_small_turn_of_the_trunk_is_made_whatever_the_friction_is(
+    channel: str, friction: float
+) -> None:
+    """Of a roll of 2 deg 0.4 were made, and ``play`` said True; of 1 deg none."""
+    with GO2Controller(plant=MujocoPlant(joint_dynamics=JointDynamics().scaled(friction))) as go2:
+        assert go2.stand()
+        motion = Timeline(name="turn")
+        for angle in (SMALL, -SMALL, 0.0):
+            motion = motion.body(**{channel: deg(angle)}, over=0.6, ease="cubic")
+        before = go2.state.rpy
+        assert go2.play(motion.hold(0.5)), go2.last_outcome
+        recording = go2.recording()
+        played = np.array(recording.labels) == "turn"
+        time = recording.time[played] - recording.time[played][0]
+        turned = [rpy_from_quaternion(q) for q in recording.q[played][:, 3:7]]
+        turned = (np.array(turned) - before)[:, ("roll", "pitch", "yaw").index(channel)]
+        reached = np.degrees(np.interp([0.6, 1.2, 1.8], time, turned))
+        np.testing.assert_allclose(reached, [SMALL, -SMALL, 0.0], atol=SMALL_ERROR)
+
+
+def test_a_robot_whose_joints_have_no_friction_stands_still() -> None:
+    """Half of the usual friction, fed forward, made it roll to and fro at 20 deg/s."""
+    with GO2Controller(plant=MujocoPlant(joint_dynamics=JointDynamics().scaled(0.0))) as go2:
+        assert go2.stand()
+        go2.wait(3.0)
+        recording = go2.recording()
+        turning = recording.v[recording.time > recording.time[-1] - 1.0, 3:6]
+        assert np.abs(turning).max() < np.radians(0.1)
 
 
 @pytest.mark.slow

@@ -172,7 +172,9 @@ def test_compiled_and_plain_are_the_same(touches: bool) -> None:
     load = packed(StanceLoad(0.01, 0.0, 400.0))
     for t in np.arange(0.0, 2.0, 0.05).tolist():
         plan, state = random_plan(rng), Tracking(landing=Landing.at(ANCHOR))
+        plan = replace(plan, force_weight=float(rng.choice([0.0, 0.01])))
         state.correction.offset[:] = rng.uniform(-0.05, 0.05, 6)
+        state.correction.friction[:] = rng.uniform(-0.01, 0.01, 6)
         state.correction.knows_payload = touches
         for foot in state.landing.feet:
             foot.is_in_air, foot.is_awaited = rng.random(2) < 0.5

@@ -1,0 +1,87 @@
+"""What holds a trunk to its plan against the dry friction of its joints, on three feet or more.
+
+Standing feet turn every way of the trunk into ways of all joints, each of which takes its friction.
+A task of the QP is an acceleration, though, so its stiffness is the inertia that is moved times the
+gain: of roll, 0.07 kg m^2 times 200 /s^2, 15 N m/rad. The friction of 0.2 N m of each joint adds up
+to 1.2 N m about that axis, and so holds the trunk up to 4.6 deg off; 1.0 deg of pitch, 1.7 of yaw.
+Half of it is fed forward (``robot.motor``), by the speed of the joints: there is none of a trunk
+that is stuck.
+
+So the trunk is held by more than while it trots, and its friction is learned. Along each axis of
+the base, with the error e of place and attitude, and the planned speed v,
+
+    a = .. + K e + D e',      c' = rate * s * e,      s = tanh(v / slow),      |c| <= limit
+
+and ``c s`` is added to what is wanted. That is the adaptive compensation of Coulomb friction
+(Friedland & Park, IEEE Trans. Automatic Control 37(10), 1992) with the sign of the planned speed
+instead of the measured one: it turns round with the plan, before the robot is stuck, takes nothing
+of a robot at rest, and cannot swing one up that has no friction, of which c becomes negative. The
+integral of ``planning.trunk`` has to unwind at every turn instead, and holds what pulls one way.
+
+Solved parts of a plan, jumps above all, keep what they ask for: a trunk that lands late is no trunk
+that friction holds, and hops were 25 mm off by what they learned of it, instead of 15.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from go2_wbc.compilation import subroutine
+from go2_wbc.records import Array6
+from go2_wbc.reference import Target
+from go2_wbc.robot.state import Snapshot
+
+STIFFNESS = (0.0, 0.0, 150.0, 1300.0, 300.0, 320.0)
+DAMPING = (0.0, 0.0, 6.0, 50.0, 12.0, 15.0)
+"""K [1/s^2] and D [1/s], beside the gains of the tasks: of ahead, left, up, roll, pitch, yaw. By
+them friction of 0.2 N m leaves 0.6 deg of roll and less of the others; commands may be 12 ms late.
+A robot whose joints have no friction rolled to and fro by 1 deg at rest, as half of 0.2 N m was fed
+forward; no longer. Ahead and aside a push is to move a robot that then steps as it did."""
+LEARNING = 10.0  #: Rate [1/s]
+SLOW_WAY, SLOW_TURN = 0.003, 0.01
+"""Planned speed [m/s], [rad/s] from which on c counts; 1 deg in 1.2 s is 0.02 rad/s at most."""
+MOST_WAY, MOST_TURN = 0.009, 0.03
+"""Limit [m], [rad]: twice what 0.2 N m of every joint leaves."""
+
+
+@subroutine
+def hold_firmly(
+    now: Snapshot, error: Array6, offset: Array6, dt: float, learned: Array6, target: Target
+) -> Array6:
+    """Add K e + D e' to the target's accelerations; returns ``c s``, in the world.
+
+    Args:
+        now: what is measured.
+        error: of place [m] and attitude [rad] from the target, in the world.
+        offset: what else is added to the target, likewise.
+        dt: since the last tick [s].
+        learned: c, along the axes of the base, which is changed.
+        target: what is asked for.
+    """
+    R, lead = now.R_world_base, np.zeros(6)
+    for n in range(6):
+        i, first = n % 3, n - n % 3
+        off, held, wanted, moving = 0.0, 0.0, 0.0, now.v[n]
+        if n < 3 and target.is_com:
+            moving = 0.0
+        for k in range(3):
+            off += R[k, i] * error[first + k]
+            held += R[k, i] * offset[first + k]
+            if n >= 3:
+                wanted += R[k, i] * target.w_world[k]
+            else:
+                wanted += R[k, i] * target.v_world[k]
+                if target.is_com:
+                    moving += R[k, i] * now.v_world_com[k]
+        sign = np.tanh(wanted / (SLOW_WAY if n < 3 else SLOW_TURN))
+        most = MOST_WAY if n < 3 else MOST_TURN
+        learned[n] = min(max(learned[n] + LEARNING * dt * sign * off, -most), most)
+        ahead = learned[n] * sign
+        more = STIFFNESS[n] * (off + held + ahead) + DAMPING[n] * (wanted - moving)
+        for k in range(3):
+            lead[first + k] += R[k, i] * ahead
+            if n >= 3:
+                target.dw_world[k] += R[k, i] * more
+            else:
+                target.a_world[k] += R[k, i] * more
+    return lead
