@@ -54,7 +54,7 @@ def test_a_trunk_that_is_to_rest_gets_nothing_of_what_was_learned(
 @pytest.mark.parametrize("way", [1.0, -1.0])
 @pytest.mark.parametrize("axis", range(6))
 def test_what_a_stuck_trunk_teaches_turns_round_with_the_plan(axis: int, way: float) -> None:
-    behind, learned = np.zeros(6), np.zeros(6)
+    behind, learned, lead = np.zeros((3, 6))
     behind[axis] = way * 0.001
     for _ in range(50):
         lead = held(moving(np.sign(behind) * FAST), behind, learned)
