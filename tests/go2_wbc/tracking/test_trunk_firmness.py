@@ -63,8 +63,8 @@ def test_what_a_stuck_trunk_teaches_turns_round_with_the_plan(axis: int, way: fl
     np.testing.assert_allclose(lead, in_world(expected), atol=1e-12)
     back = held(moving(-np.sign(behind) * FAST), np.zeros(6), learned)
     np.testing.assert_allclose(back, -lead, atol=1e-12)
-    for _ in range(10000):
-        held(moving(np.sign(behind) * FAST), behind, learned)
+    for _ in range(200):
+        held(moving(np.sign(behind) * FAST), 10.0 * behind, learned)
     assert learned[axis] == MOST[axis], "no more is stored up"
 
 
