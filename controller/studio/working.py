@@ -16,7 +16,7 @@ from multiprocessing.synchronize import Event
 from typing import TYPE_CHECKING, final
 
 from controller.studio.literals import Run
-from controller.studio.orders import AT_ONCE, Answer, Bar, Doing, Order, Task, TooLong
+from controller.studio.orders import AT_ONCE, Answer, Bar, Cut, Doing, Order, Task, TooLong
 from controller.studio.plain import in_words, is_unsolved, plainly
 from controller.studio.source import Slot, Source
 from controller.studio.splitting import split
@@ -137,6 +137,7 @@ def _answer(
     teller: Teller,
 ) -> Answer | StudioError:
     from controller.report_view import planned, slider
+    from controller.studio.writing_out import written_out
     from motions import suggest
 
     has_run = False
@@ -152,10 +153,12 @@ def _answer(
             found = suggest(line, checker=checker)
             changes = tuple((item.call, item.meaning) for item in found)
             return Answer(motion.name, changes=changes)
-        if order.cut is not None:
-            after = split(source, str(order.path), made.marks, order.cut)
-            end = after.offset(after.site) if after.site else 0
-            return Answer(motion.name, split=(after.data, end))
+        if isinstance(order.part, Cut):
+            after = split(source, str(order.path), made.marks, order.part)
+            return Answer(motion.name, text=(after.data, after.site and after.offset(after.site)))
+        if order.part is not None:
+            after = written_out(source, maker, order, made)
+            return Answer(motion.name, text=(after.data, None))
         checked = jumps.evaluate(line, order)
         if order.task is Task.PLAY:
             content, told = _played(checked, checker, teller)
@@ -230,6 +233,8 @@ def _bars(
             tuple(slots),
             values,
             call.callers,
+            "" if is_here else call.file,
+            0 if is_here else call.site[0],
         )
 
 

@@ -40,8 +40,8 @@ class Call:
     number: int  #: how often this call had run before
     arguments: dict[str, object]  #: those that were given, by the names of the parameters
     callers: tuple[tuple[tuple[int, int], int], ...] = ()
-    """Where the calls of the functions of this file end that it runs in, the innermost first, and
-    how often they had run before."""
+    """Where the calls of the functions of this file, or of the one that is traced, end that it runs
+    in, the innermost first, and how often they had run before."""
     before: Timeline | None = field(default=None, compare=False, repr=False)
     """What it was called on."""
 
@@ -70,8 +70,12 @@ def separated(line: Timeline) -> tuple[Timeline, list[CallMark]]:
 
 
 @contextmanager
-def traced() -> Iterator[None]:
-    """Have calls leave marks; not for two threads at once."""
+def traced(path: str = "") -> Iterator[None]:
+    """Have calls leave marks; not for two threads at once.
+
+    ``path``: of the file whose ``callers`` are told, of calls in other files, too; by default
+    those in the file of each call are.
+    """
     methods: dict[str, Callable[..., Any]] = {
         name: method
         for kind in reversed(Timeline.__mro__)
@@ -83,7 +87,7 @@ def traced() -> Iterator[None]:
     entered = defaultdict[tuple[str, tuple[int, int]], dict[FrameType, int]](dict)
 
     def callers(frame: FrameType) -> Iterator[tuple[tuple[int, int], int]]:
-        file, outer = frame.f_code.co_filename, frame.f_back
+        file, outer = path or frame.f_code.co_filename, frame.f_back
         while outer is not None:
             if outer.f_code.co_filename == file:
                 site = _end_of(outer.f_code, outer.f_lasti)

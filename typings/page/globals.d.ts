@@ -39,6 +39,9 @@ interface Bar {
   slots: Slot[];
   values: Record<string, number | string>;
   more: string[];
+  /** Where it is written, if that is another file. */
+  file: string;
+  line: number;
 }
 
 /** What the studio shows; see `controller.studio.session`. */

@@ -352,6 +352,62 @@ def test_a_loop_is_written_out_and_the_whole_undone(studio: Studio, file: Path) 
     assert file.read_text(encoding="utf-8") == text
 
 
+def test_what_is_computed_is_written_out_once_its_lines_were_shown(
+    studio: Studio, file: Path
+) -> None:
+    text = GREET.replace("over=0.6).home", "over=sum((0.2, 0.4))).home")
+    text = text.replace('foot("FR"', 'foot("".join("FR")')
+    file.write_text(text, encoding="utf-8")
+    _look(studio)
+    editor = _editor(studio)
+    bar = [bar["name"] for bar in editor["bars"]].index("foot")
+    order: dict[str, object] = {"op": "write_out", "bar": bar, "base": editor["base"]}
+    offers = {"op": "offers", "site": editor["bars"][bar]["site"], "base": editor["base"]}
+    assert "write_out" in [offer["op"] for offer in _told(studio, offers)["offers"]]
+    told = _told(studio, {"op": "propose", "proposed": order, "base": editor["base"]})
+    assert (
+        '-        line = line.foot("".join("FR"), z=0.08, over=0.5).down("FR", over=0.5)'
+        in told["diff"]
+    )
+    assert '+        line = line.foot("FR", z=0.08, over=0.5).down("FR", over=0.5)' in told["diff"]
+    assert told["fixed"] == []
+    assert file.read_text(encoding="utf-8") == text, "shown only"
+    for wrong in ({"bar": 99}, {"bar": "a"}, {}):
+        assert "error" in _told(studio, {"base": editor["base"], "op": "write_out", **wrong})
+    assert "error" not in _told(studio, {**order, "commit": True})
+    assert file.read_text(encoding="utf-8") == text.replace('"".join("FR")', '"FR"')
+    studio.edit({"op": "undo"})
+    assert file.read_text(encoding="utf-8") == text
+
+
+def test_bars_of_other_files_are_written_out_here_or_read_there(studio: Studio, file: Path) -> None:
+    helper = file.with_name("elsewhere.py")
+    helper.write_text(
+        "from motions import Timeline\n\n\ndef dip(deep: float) -> Timeline:\n"
+        "    return Timeline().body(z=-deep, over=0.5).home(over=0.5)\n",
+        encoding="utf-8",
+    )
+    text = GREET.replace("from motions", "from elsewhere import dip\nfrom motions").replace(
+        "line.home(over=0.6)", "line.home(over=0.6).then(dip(0.01 * times))"
+    )
+    file.write_text(text, encoding="utf-8")
+    _look(studio)
+    editor = _editor(studio)
+    (bar, *_) = (k for k, one in enumerate(editor["bars"]) if one["file"])
+    known = {"bar": bar, "base": editor["base"]}
+    read = _told(studio, {"op": "read", **known})
+    assert (read["line"], read["file"]) == (5, str(helper.resolve()))
+    assert read["text"] == helper.read_text(encoding="utf-8").splitlines()
+    assert "error" in _told(studio, {"op": "read", "bar": 0, "base": editor["base"]})
+    offers = {"op": "offers", "site": [0, 0], **known}
+    assert [offer["op"] for offer in _told(studio, offers)["offers"]] == ["write_out"]
+    order = {"op": "write_out", **known}
+    told = _told(studio, {"op": "propose", "proposed": order, "base": editor["base"]})
+    assert told["fixed"] == ["times"], "what it was called with is a number then"
+    assert "error" not in _told(studio, {**order, "commit": True})
+    assert ".then(Timeline().body(z=-0.01, over=0.5).home(over=0.5))" in file.read_text("utf-8")
+
+
 def test_an_empty_motion_is_shown_and_begun(studio: Studio, file: Path) -> None:
     empty = "from motions import Timeline, deg, motion\n\n\n@motion\ndef greet() -> Timeline:\n"
     file.write_text(f"{empty}    return Timeline()\n", encoding="utf-8")
