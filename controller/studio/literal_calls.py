@@ -89,7 +89,7 @@ class Writer:
         given = [
             self.argument(item.name, getattr(line, item.name), left)
             for item in fields(line)
-            if item.name not in _STATE and getattr(line, item.name) != item.default
+            if item.init and item.name not in _STATE and getattr(line, item.name) != item.default
         ]
         return _laid(f"{self._name(Timeline.__name__)}(", given, ")", left)
 

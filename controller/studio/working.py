@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gc
 import math
+import signal
+import sys
 import threading
 import time
 from collections import Counter
@@ -16,7 +18,17 @@ from multiprocessing.synchronize import Event
 from typing import TYPE_CHECKING, final
 
 from controller.studio.literals import Run
-from controller.studio.orders import AT_ONCE, Answer, Bar, Cut, Doing, Order, Task, TooLong
+from controller.studio.orders import (
+    AT_ONCE,
+    LONGEST_RUN,
+    Answer,
+    Bar,
+    Cut,
+    Doing,
+    Order,
+    Task,
+    TooLong,
+)
 from controller.studio.plain import in_words, is_unsolved, plainly
 from controller.studio.source import Slot, Source
 from controller.studio.splitting import split
@@ -144,7 +156,8 @@ def _answer(
     if order.task is Task.PLAY:
         teller.tell(Doing("playing"))  # the check comes first
     try:
-        made = maker.make(order)
+        with _ended_after(LONGEST_RUN):
+            made = maker.make(order)
         motion, values, line = made.motion, made.values, made.line
         pipe.send("made")
         has_run = True
@@ -179,6 +192,34 @@ def _answer(
     shown = content if order.task is Task.EXPORT else prepared(content)
     is_solved = not is_unsolved(content)
     return Answer(motion.name, shown, bars, made.names, told, made.notes, is_solved=is_solved)
+
+
+class _Endless(BaseException):
+    """What no file catches."""
+
+
+@contextmanager
+def _ended_after(seconds: float) -> Iterator[None]:
+    """End what takes longer than this of processor time, where that can be: the process stays.
+
+    Raises:
+        StudioError: then.
+    """
+
+    def end(*_: object) -> None:
+        raise _Endless
+
+    if sys.platform == "win32":
+        yield
+        return
+    signal.signal(signal.SIGPROF, end)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    except _Endless:
+        raise StudioError(f"the file ran for longer than {seconds:g} s; it was stopped") from None
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
 def _played(

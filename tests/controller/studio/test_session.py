@@ -258,12 +258,18 @@ def test_an_exported_page_plays_the_song(studio: Studio, file: Path) -> None:
 def test_a_file_that_never_ends_is_stopped_and_the_next_one_runs(
     studio: Studio, file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(running, "LONGEST_RUN", 0.5)
+    process = studio._runner._process.pid
     endless = GREET.replace("    line = Time", "    while times: pass\n    line = Time")
     file.write_text(endless, encoding="utf-8")
     _look(studio)
-    assert "ran for longer than 0.5 s; it was stopped" in str(studio._server._error)
+    assert "ran for longer than 2 s; it was stopped" in str(studio._server._error)
+    file.write_text(GREET, encoding="utf-8")
+    _look(studio)
+    assert studio._server._error is None
+    assert studio._runner._process.pid == process, "the robot need not be loaded again"
+    monkeypatch.setattr(running, "LONGEST_WAIT", 0.5)
     for text, told in (
+        (GREET + "\nimport time\ntime.sleep(99)\n", "ran for longer than 0.5 s; it was stopped"),
         (GREET + "\nimport os\nos._exit(3)\n", "has ended the process"),
         (GREET + "\nimport sys\nsys.exit(3)\n", "the file ends the program"),
     ):
