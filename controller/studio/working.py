@@ -262,7 +262,7 @@ def _bars(
             values["others"] = source.text(call.site).partition("(")[2][:-1]
         slots = list[Slot]()
         if is_here and not is_draft:
-            slots = source.slots(call.site, Run(call.number, call.callers))
+            slots = [*_chosen(source.slots(call.site, Run(call.number, call.callers)), values)]
         yield Bar(
             call.name,
             call.site if is_here else (0, 0),
@@ -277,6 +277,19 @@ def _bars(
             "" if is_here else call.file,
             0 if is_here else call.site[0],
         )
+
+
+def _chosen(slots: Sequence[Slot], values: Mapping[str, float | str]) -> Iterator[Slot]:
+    """The slots, of both values of a choice with whether it is the one that was taken."""
+
+    def is_taken(slot: Slot) -> bool:
+        value = math.radians(float(slot.value or 0)) if slot.is_angle else slot.value
+        return slot.is_choice and slot.of in values and value == values[slot.of]
+
+    known = Counter(slot.of for slot in slots if is_taken(slot))
+    for slot in slots:
+        is_known = slot.is_choice and known[slot.of] == 1
+        yield replace(slot, plays=is_taken(slot)) if is_known else slot
 
 
 def _values(arguments: Mapping[str, object]) -> Iterator[tuple[str, float | str]]:

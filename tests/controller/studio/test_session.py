@@ -386,6 +386,20 @@ def test_what_is_computed_is_written_out_once_its_lines_were_shown(
     assert file.read_text(encoding="utf-8") == text
 
 
+def test_of_a_choice_it_is_told_which_value_plays(studio: Studio, file: Path) -> None:
+    chosen = "over=0.5 if times > 2 else 0.7).down"
+    text = GREET.replace("over=0.5).down", chosen).replace("deg(10.0)", "deg(8 if times else 10)")
+    file.write_text(text.replace("0.6).home", "0.6 if times else times * 0.7).home"), "utf-8")
+    _look(studio)
+    slots = {
+        bar["name"]: [(one["value"], one["plays"]) for one in bar["slots"]]
+        for bar in _editor(studio)["bars"]
+    }
+    assert slots["foot"] == [("FR", None), (0.08, None), (0.5, False), (0.7, True)]
+    assert slots["body"][:2] == [(8, True), (10, False)]
+    assert slots["body"][2] == (0.6, True)
+
+
 def test_bars_of_other_files_are_written_out_here_or_read_there(studio: Studio, file: Path) -> None:
     helper = file.with_name("elsewhere.py")
     helper.write_text(

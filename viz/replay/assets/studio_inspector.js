@@ -121,7 +121,8 @@ class Inspector {
       if (!isWord) this.resting = setTimeout(() => send(false), DRAFT_REST);
     });
     input.addEventListener("change", () => this.isGivenUp || send(true));
-    const note = slot.place ? `${unit} · ${slot.place}` : unit;
+    const plays = { true: "this one plays", false: "does not play now" }[String(slot.plays)];
+    const note = [plays, unit, slot.place].filter(Boolean).join(" · ");
     row.append(input, element("small", { textContent: note, title: note }));
     return row;
   }

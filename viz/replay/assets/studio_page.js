@@ -352,7 +352,7 @@ class Studio {
     } catch {
       return;
     }
-    this.player.use(data);
+    if (data !== this.player.data) this.player.use(data);
     this.use(this.player.data.header.editor, site);
   }
 
