@@ -493,5 +493,6 @@ def _picked(one: Bar | Slot, names: Sequence[str]) -> dict[str, object]:
     return {name: getattr(one, name) for name in names}
 
 
-_BAR, _SLOT = (tuple(field.name for field in fields(kind)) for kind in (Bar, Slot))
+_BAR = tuple(field.name for field in fields(Bar))
+_SLOT = tuple(field.name for field in fields(Slot) if field.name != "is_choice")
 _DRAFT = ("name", "number", "span", "parts", "broken", "values")  #: What a drag changes of a bar
