@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 from controller.studio.library import used
 from controller.studio.literals import Run
+from controller.studio.orders import Cut
 from controller.studio.rewriting import begun, parametrised, unrolled
 from controller.studio.source import Source, first_parameters, parameters, written
 from controller.studio.syntax import Site
@@ -129,6 +130,14 @@ def run_of(order: Mapping[str, object]) -> Run:
             case _:
                 raise StudioError(f"a caller is a place and a number, got {caller!r:.80}")
     return Run(number, tuple(known))
+
+
+def cut_of(order: Mapping[str, object]) -> Cut:
+    """Where an order splits a call; raises StudioError if it says that in no valid way."""
+    time, number = order.get("time"), order.get("number") or 0
+    if not isinstance(time, int | float) or type(number) is not int:
+        raise StudioError(f"a call is split at a time, got {time!r:.40}")
+    return Cut(site_of(order.get("site")), number, float(time))
 
 
 def _number(order: Mapping[str, object]) -> float:

@@ -64,6 +64,7 @@ class Literal:
     place: str = ""  #: where it stands, if not in the call itself: "HEIGHT, line 12"
     depth: int = 0  #: how many names lead to it
     is_of_loop: bool = False  #: whether it is another one in each round
+    is_choice: bool = False  #: whether it is one of the two of ``a if x else b``
 
     @property
     def is_member(self) -> bool:
@@ -134,7 +135,12 @@ class _Finder:
         nearest = [one for one in every if one.depth == 0 or is_choice] or every
         where = "" if is_angle else f"in {self._syntax.node(node)}"
         nearest = [
-            replace(one, is_angle=one.is_angle or is_angle, place=one.place or where)
+            replace(
+                one,
+                is_angle=one.is_angle or is_angle,
+                place=one.place or where,
+                is_choice=one.is_choice or is_choice,
+            )
             for one in nearest
         ]
         return sorted(nearest, key=lambda one: one.is_of_loop)

@@ -37,6 +37,7 @@ class Made:
     line: Timeline
     marks: tuple[CallMark, ...]  #: of its calls
     notes: tuple[str, ...]  #: what is to be known of it, in words
+    whole: Timeline  #: the line with the marks in it
 
 
 @final
@@ -66,15 +67,16 @@ class Maker:
         return replace(made, notes=tuple(notes))
 
     def _made(self, order: Order) -> Made:
-        with traced():
+        with traced(str(order.path)):
             own = load_text(order.path, order.data)
             motion = own.get(order.chosen or "", next(iter(own.values())))
             known = {item.name for item in motion.parameters}
             values = {name: value for name, value in order.values.items() if name in known}
-            line, marks = separated(motion(**values))
+            whole = motion(**values)
+        line, marks = separated(whole)
         if not line.keys:  # begun, and nothing written yet: it stands
             line = line.body(z=0.0, over=1.0)
-        return Made(motion, tuple(own), values, line, tuple(marks), ())
+        return Made(motion, tuple(own), values, line, tuple(marks), (), whole)
 
     def _forget_changed(self, folder: Path) -> None:
         """Have what is imported from ``folder`` read again if any of it was written meanwhile."""

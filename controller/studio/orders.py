@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from viz.replay.page_data import Prepared
 
 
+LONGEST_RUN = 2.0
+"""Processor time [s] that a file may take to make its motion: own choice, the library's take 10 ms,
+one of 1,000 calls 0.3 s."""
 AT_ONCE = 1e-6  #: Time [s] to solve a jump for, in which only what is known is found
 
 
@@ -32,7 +35,7 @@ class Task(Enum):
     EXPORT = "export"  #: check, and have all of the content, not only what the page needs
     PLAY = "play"  #: in MuJoCo, beside the plan
     MEND = "mend"  #: look for changes that make it possible
-    SPLIT = "split"  #: make two calls of one
+    REWRITE = "rewrite"  #: make two calls of one, or write out what is computed
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +56,7 @@ class Order:
     chosen: str | None  #: which of its motions; None for the first
     values: Mapping[str, Value]  #: chosen parameters
     task: Task = Task.CHECK  #: what is done with it
-    cut: Cut | None = None  #: where it is split
+    part: Cut | int | None = None  #: where a call is split, or the place of a bar to be written out
     longest: float = 0.0  #: processor time [s] that one jump may be solved for; 0: the solver's own
     is_shown: bool = False  #: also without the jumps that were not found by then
     is_looked_for: bool = False  #: what was not found is looked for by another process meanwhile
@@ -83,6 +86,8 @@ class Bar:
     slots: tuple[Slot, ...]  #: the arguments that are written in it; none of a draft
     values: Mapping[str, float | str]  #: of its arguments, as it ran; angles in radians
     callers: tuple[tuple[tuple[int, int], int], ...] = ()  #: see ``motions.language.tracing``
+    file: str = ""  #: where it is written, if that is another one
+    line: int = 0  #: of that file
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +103,7 @@ class Answer:
     notes: tuple[str, ...] = ()  #: what is to be known of the file, in words
     changes: tuple[tuple[str, str], ...] = ()
     """Calls that make it possible, to be appended to the motion, each with its meaning."""
-    split: tuple[bytes, int] | None = None
-    """The text with one call made two, and the byte behind them."""
+    text: tuple[bytes, int | None] | None = None
+    """It rewritten, and the byte behind the call that is chosen then."""
     is_solved: bool = True
     """Whether all that jumps was solved; without content it took longer than it may."""

@@ -160,7 +160,7 @@ def parametrised(source: Source, motion: str, site: Site, name: str, run: Run) -
     slot = next((one for one in source.slots(site, run) if one.name == name), None)
     if slot is None or slot.span is None or isinstance(slot.value, str | None):
         raise StudioError(f"{name} is no number that stands in the file")
-    function = _motion(syntax, motion)
+    function = motion_in(syntax, motion)
     if len(function.decorator_list) > 1:
         raise StudioError(f"{motion} is more than a motion: something else is written over it")
     start, end = syntax.span(function)
@@ -172,10 +172,11 @@ def parametrised(source: Source, motion: str, site: Site, name: str, run: Run) -
         _in_signature(syntax, function, _declared(new, slot)),
     ]
     changes += _imports(syntax, {"Annotated": "typing", "Range": "motions"})
-    return _changed(source, changes)
+    return changed(source, changes)
 
 
-def _motion(syntax: Syntax, motion: str) -> ast.FunctionDef:
+def motion_in(syntax: Syntax, motion: str) -> ast.FunctionDef:
+    """The function of a motion; raises StudioError if it is not in the file."""
     for node in syntax.tree.body:
         if isinstance(node, ast.FunctionDef) and node.name == motion and node.decorator_list:
             return node
@@ -221,7 +222,7 @@ def imported(source: Source, wanted: Mapping[str, str]) -> Source:
     changes = _imports(source.syntax, wanted)
     if not changes:
         return source
-    after = _changed(source, changes)
+    after = changed(source, changes)
     end = None if source.site is None else source.offset(source.site)
     return Source(after.data, end and end + len(after.data) - len(source.data))
 
@@ -251,7 +252,7 @@ def _imports(syntax: Syntax, wanted: Mapping[str, str]) -> list[Change]:
     return changes
 
 
-def _changed(source: Source, changes: Sequence[Change]) -> Source:
+def changed(source: Source, changes: Sequence[Change]) -> Source:
     """Several changes as one span."""
     in_order = sorted(changes, key=lambda change: change[0])
     first, last = in_order[0][0][0], in_order[-1][0][1]
@@ -269,7 +270,7 @@ def begun(source: Source, motion: str, code: str) -> Source:
         StudioError: if there is no ``Timeline()`` in it.
     """
     syntax = source.syntax
-    for node in ast.walk(_motion(syntax, motion)):
+    for node in ast.walk(motion_in(syntax, motion)):
         if isinstance(node, ast.Call) and syntax.name(node) == "Timeline":
             end = syntax.span(node)[1]
             return source.replaced((end, end), code, end + len(code.encode()))
@@ -277,14 +278,20 @@ def begun(source: Source, motion: str, code: str) -> Source:
 
 
 def offers(source: Source, motion: str, site: Site, run: Run) -> list[dict[str, str]]:
-    """What a page may offer for a bar: each an order for ``edited``, with its title."""
+    """What a page may offer for a bar: each an order for ``Studio.edit``, with its title."""
+    written_out = {"op": "write_out", "title": "Write it out, with the values that it has now"}
+    if not site[0]:  # of another file
+        return [written_out]
     found = list[dict[str, str]]()
     try:
         unrolled(source, site, run)
         found.append({"op": "unroll", "title": "Write the loop out, round by round"})
     except StudioError:
         pass
-    for slot in source.slots(site, run):
+    slots = source.slots(site, run)
+    if any(slot.span is None for slot in slots):
+        found.append(written_out)
+    for slot in slots:
         try:
             parametrised(source, motion, site, slot.name, run)
         except StudioError:

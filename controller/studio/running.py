@@ -19,8 +19,8 @@ from controller.studio.working import serve
 from controller.sweeps.engine import ONE_THREAD
 from go2_wbc.errors import StudioError
 
-LONGEST_RUN = 2.0
-"""Time [s] that a file may take to make its motion: own choice, the library's take 10 ms."""
+LONGEST_WAIT = 10.0
+"""Time [s] after which a file is ended that waits, or goes on when its own time is over."""
 LONGEST_WORK = 120.0  #: Time [s] that solving, checking or playing may take
 
 
@@ -74,7 +74,7 @@ class Runner:
                     self.tell(Doing("loading"))
                     self._received(LONGEST_WORK, "could not be loaded")
                     self._is_warm = True
-                self._received(LONGEST_RUN, f"ran for longer than {LONGEST_RUN:g} s")
+                self._received(LONGEST_WAIT, f"ran for longer than {LONGEST_WAIT:g} s")
                 answer = self._received(LONGEST_WORK, f"was at it for {LONGEST_WORK:g} s")
             except (EOFError, OSError) as error:
                 self._restart()

@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import final
 
 import viz
-from controller.studio.edits import PALETTE, edited, run_of, site_of
+from controller.studio.edits import PALETTE, cut_of, edited, run_of, site_of
 from controller.studio.library import library
 from controller.studio.orders import AT_ONCE, Answer, Bar, Cut, Doing, Order, Task
 from controller.studio.plain import NO_WAY
 from controller.studio.project import Project
+from controller.studio.proposals import proposal, read
 from controller.studio.rewriting import offers
 from controller.studio.running import Runner
 from controller.studio.shows import with_show
@@ -149,7 +150,9 @@ class Studio:
             order: see ``edited_together``; besides ``op`` "undo" and "redo", "change" (see
                 ``mend``), "offers" (what there is to be done for a bar, by ``site`` and ``number``)
                 and "split" (it, at a ``time``), "show" (a motion that plays all others), and
-                "paste" behind ``site`` what ``copy`` has taken. ``base`` is the state of the file
+                "paste" behind ``site`` what ``copy`` has taken; "write_out" a ``bar``, by its
+                place, "read" the file that it is of. Of an order that is ``proposed`` what it would
+                change in the text is told. ``base`` is the state of the file
                 that the page knows, ``has`` the version of what it shows, ``commit`` whether to
                 save.
 
@@ -167,6 +170,11 @@ class Studio:
                     place = site_of(order.get("site")), run_of(self._with_callers(order))
                     source = Source(self._project.saved)
                     return {"offers": offers(source, self.motion or "", *place)}
+                if order.get("op") == "read":
+                    return read(self._bars[self._bar(order)])
+                if isinstance(proposed := order.get("proposed"), dict):
+                    after = self._edited(proposed)
+                    return proposal(Source(self._project.saved), after, self.motion or "")
                 return self._done(order)
             except StudioError as error:
                 return {"error": str(error)}
@@ -201,8 +209,8 @@ class Studio:
         source = Source(self._project.saved)
         if order.get("op") == "paste":
             return pasted(source, order, self._copied)
-        if order.get("op") == "split":
-            return self._split(order)
+        if order.get("op") in ("split", "write_out"):
+            return self._rewritten(order)
         if order.get("op") != "change":
             motion = self.motion or ""
             return edited_together(
@@ -213,16 +221,19 @@ class Studio:
             raise StudioError("a change is one of those that were proposed")
         return source.append(self.motion or "", self._changes[which])
 
-    def _split(self, order: Mapping[str, object]) -> Source:
-        """Where a way is at an instant is known to what runs the file."""
-        time, number = order.get("time"), order.get("number") or 0
-        if not isinstance(time, int | float) or type(number) is not int:
-            raise StudioError(f"a call is split at a time, got {time!r:.40}")
-        cut = Cut(site_of(order.get("site")), number, float(time))
-        after = self._run(self._project.saved, Task.SPLIT, cut).split
+    def _rewritten(self, order: Mapping[str, object]) -> Source:
+        """What values there are at an instant, or were once, is known to what runs the file."""
+        part = cut_of(order) if order.get("op") == "split" else self._bar(order)
+        after = self._run(self._project.saved, Task.REWRITE, part).text
         if after is None:
-            raise StudioError("there is nothing to split")
+            raise StudioError("there is nothing to rewrite")
         return Source(*after)
+
+    def _bar(self, order: Mapping[str, object]) -> int:
+        bar = order.get("bar")
+        if type(bar) is not int or not 0 <= bar < len(self._bars):
+            raise StudioError(f"a bar is one of those that are shown, got {bar!r:.40}")
+        return bar
 
     def copy(self, order: Mapping[str, object]) -> dict[str, object]:
         """Keep the calls that end in ``sites``, to be pasted into any motion of the file."""
@@ -395,15 +406,15 @@ class Studio:
         self,
         data: bytes,
         task: Task = Task.CHECK,
-        cut: Cut | None = None,
+        part: Cut | int | None = None,
         chosen: str | None = None,
         longest: float = 0.0,
         *,
         is_afresh: bool = False,
     ) -> Answer:
         order = self._order(data, task, longest, chosen)
-        order = replace(order, cut=cut, is_afresh=is_afresh)
-        is_quick = task in (Task.CHECK, Task.DRAFT, Task.EXPORT, Task.SPLIT)
+        order = replace(order, part=part, is_afresh=is_afresh)
+        is_quick = task in (Task.CHECK, Task.DRAFT, Task.EXPORT, Task.REWRITE)
         answer = (self._runner if is_quick else self._player).run(order)
         if data == self._project.saved and answer.bars:
             self._bars, self._is_solved = answer.bars, answer.is_solved
@@ -482,5 +493,6 @@ def _picked(one: Bar | Slot, names: Sequence[str]) -> dict[str, object]:
     return {name: getattr(one, name) for name in names}
 
 
-_BAR, _SLOT = (tuple(field.name for field in fields(kind)) for kind in (Bar, Slot))
+_BAR = tuple(field.name for field in fields(Bar))
+_SLOT = tuple(field.name for field in fields(Slot) if field.name != "is_choice")
 _DRAFT = ("name", "number", "span", "parts", "broken", "values")  #: What a drag changes of a bar

@@ -41,6 +41,8 @@ class Slot:
     why: str = ""  #: why it cannot be replaced
     of: str = ""  #: the parameter that it is of, or in
     is_member: bool = False  #: whether the word is written as a member, such as ``Posture.SIT``
+    is_choice: bool = False  #: whether it is one of the two of ``a if x else b``
+    plays: bool | None = None  #: whether that one is it in this run; None where that is not known
 
 
 @final
@@ -344,8 +346,17 @@ class Source:
         if isinstance(literal.node, ast.Attribute):
             value = literal.node.attr
             span = span[1] - len(value), span[1]
-        is_angle, is_member = literal.is_angle, literal.is_member
-        return Slot(name, code, span, value, is_angle, literal.place, of=of, is_member=is_member)
+        return Slot(
+            name,
+            code,
+            span,
+            value,
+            literal.is_angle,
+            literal.place,
+            of=of,
+            is_member=literal.is_member,
+            is_choice=literal.is_choice,
+        )
 
     def _added(self, site: Site, name: str, value: float | str) -> Source:
         call = self._call(site)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gc
 import math
+import signal
+import sys
 import threading
 import time
 from collections import Counter
@@ -16,7 +18,17 @@ from multiprocessing.synchronize import Event
 from typing import TYPE_CHECKING, final
 
 from controller.studio.literals import Run
-from controller.studio.orders import AT_ONCE, Answer, Bar, Doing, Order, Task, TooLong
+from controller.studio.orders import (
+    AT_ONCE,
+    LONGEST_RUN,
+    Answer,
+    Bar,
+    Cut,
+    Doing,
+    Order,
+    Task,
+    TooLong,
+)
 from controller.studio.plain import in_words, is_unsolved, plainly
 from controller.studio.source import Slot, Source
 from controller.studio.splitting import split
@@ -137,13 +149,15 @@ def _answer(
     teller: Teller,
 ) -> Answer | StudioError:
     from controller.report_view import planned, slider
+    from controller.studio.writing_out import written_out
     from motions import suggest
 
     has_run = False
     if order.task is Task.PLAY:
         teller.tell(Doing("playing"))  # the check comes first
     try:
-        made = maker.make(order)
+        with _ended_after(LONGEST_RUN):
+            made = maker.make(order)
         motion, values, line = made.motion, made.values, made.line
         pipe.send("made")
         has_run = True
@@ -152,10 +166,12 @@ def _answer(
             found = suggest(line, checker=checker)
             changes = tuple((item.call, item.meaning) for item in found)
             return Answer(motion.name, changes=changes)
-        if order.cut is not None:
-            after = split(source, str(order.path), made.marks, order.cut)
-            end = after.offset(after.site) if after.site else 0
-            return Answer(motion.name, split=(after.data, end))
+        if isinstance(order.part, Cut):
+            after = split(source, str(order.path), made.marks, order.part)
+            return Answer(motion.name, text=(after.data, after.site and after.offset(after.site)))
+        if order.part is not None:
+            after = written_out(source, maker, order, made)
+            return Answer(motion.name, text=(after.data, None))
         checked = jumps.evaluate(line, order)
         if order.task is Task.PLAY:
             content, told = _played(checked, checker, teller)
@@ -176,6 +192,34 @@ def _answer(
     shown = content if order.task is Task.EXPORT else prepared(content)
     is_solved = not is_unsolved(content)
     return Answer(motion.name, shown, bars, made.names, told, made.notes, is_solved=is_solved)
+
+
+class _Endless(BaseException):
+    """What no file catches."""
+
+
+@contextmanager
+def _ended_after(seconds: float) -> Iterator[None]:
+    """End what takes longer than this of processor time, where that can be: the process stays.
+
+    Raises:
+        StudioError: then.
+    """
+
+    def end(*_: object) -> None:
+        raise _Endless
+
+    if sys.platform == "win32":
+        yield
+        return
+    signal.signal(signal.SIGPROF, end)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    except _Endless:
+        raise StudioError(f"the file ran for longer than {seconds:g} s; it was stopped") from None
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
 def _played(
@@ -218,7 +262,7 @@ def _bars(
             values["others"] = source.text(call.site).partition("(")[2][:-1]
         slots = list[Slot]()
         if is_here and not is_draft:
-            slots = source.slots(call.site, Run(call.number, call.callers))
+            slots = [*_chosen(source.slots(call.site, Run(call.number, call.callers)), values)]
         yield Bar(
             call.name,
             call.site if is_here else (0, 0),
@@ -230,7 +274,22 @@ def _bars(
             tuple(slots),
             values,
             call.callers,
+            "" if is_here else call.file,
+            0 if is_here else call.site[0],
         )
+
+
+def _chosen(slots: Sequence[Slot], values: Mapping[str, float | str]) -> Iterator[Slot]:
+    """The slots, of both values of a choice with whether it is the one that was taken."""
+
+    def is_taken(slot: Slot) -> bool:
+        value = math.radians(float(slot.value or 0)) if slot.is_angle else slot.value
+        return slot.is_choice and slot.of in values and value == values[slot.of]
+
+    known = Counter(slot.of for slot in slots if is_taken(slot))
+    for slot in slots:
+        is_known = slot.is_choice and known[slot.of] == 1
+        yield replace(slot, plays=is_taken(slot)) if is_known else slot
 
 
 def _values(arguments: Mapping[str, object]) -> Iterator[tuple[str, float | str]]:

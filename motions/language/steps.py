@@ -315,10 +315,12 @@ class Steps(TimelineData):
         least = 2.0 * gait.rest + (rounds - 1.0 + gait.last) * gait.least_period
         if end - start < least - SAME:
             hint = "" if name == "trot" else ', or try gait="trot"'
-            more = "s" if rounds > 1 else ""
+            take = (
+                f"rounds of gait {name!r} take" if rounds > 1 else f"round of gait {name!r} takes"
+            )
             raise TimelineError(
-                f"{what}: {end - start:.2f} s are too short: {rounds} round{more} of gait {name!r} "
-                f"take {least:.2f} s at the fastest; give it more time{hint}"
+                f"{what}: {end - start:.2f} s are too short: {rounds} {take} {least:.2f} s at the "
+                f"fastest; give it more time{hint}"
             )
         return rhythm_within(gait, rounds, end - start)
 

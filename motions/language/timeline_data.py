@@ -145,6 +145,7 @@ class TimelineData:
     last_start: float = field(default=0.0, kw_only=True)  #: when [s] the last call's move starts
     floor: float = field(default=0.0, kw_only=True)
     """The cursor does not fall behind this time [s] after ``also``."""
+    latest: float = field(default=0.0, init=False, compare=False)  #: when [s] its last key ends
 
     _repr_html_ = inline_html
 
@@ -172,6 +173,7 @@ class TimelineData:
             raise TimelineError(
                 f"tolerance must be a Tolerance(position [m], angle [rad]), got {self.tolerance!r}"
             )
+        object.__setattr__(self, "latest", max((key.end for key in self.keys), default=0.0))
         self._require_length(self.end)
         _require_no_overlap(self.keys)
 
@@ -240,15 +242,19 @@ class TimelineData:
 
     def _longer(self, keys: Sequence[Key], cursor: float) -> Self:
         first = min((key.start for key in keys), default=self.cursor)
+        latest = max([self.latest, *(key.end for key in keys)])
         longer = unchecked(
             self,
             keys=(*self.keys, *keys),
             cursor=max(cursor, self.floor),
             last_start=first,
             floor=0.0,
+            latest=latest,
         )
-        longer._require_length(max([longer.cursor, *(key.end for key in keys)]))
-        _require_no_overlap([*(key for key in self.keys if key.end >= first - SAME), *keys])
+        longer._require_length(max(longer.cursor, latest))
+        is_behind = self.latest <= first + SAME  # all of them: a long motion is not gone through
+        meanwhile = [] if is_behind else [key for key in self.keys if key.end > first]
+        _require_no_overlap([*meanwhile, *keys])
         return longer
 
     def _joined(self, other: TimelineData, start: float) -> Self:

@@ -40,8 +40,8 @@ class Call:
     number: int  #: how often this call had run before
     arguments: dict[str, object]  #: those that were given, by the names of the parameters
     callers: tuple[tuple[tuple[int, int], int], ...] = ()
-    """Where the calls of the functions of this file end that it runs in, the innermost first, and
-    how often they had run before."""
+    """Where the calls of the functions of this file, or of the one that is traced, end that it runs
+    in, the innermost first, and how often they had run before."""
     before: Timeline | None = field(default=None, compare=False, repr=False)
     """What it was called on."""
 
@@ -69,9 +69,28 @@ def separated(line: Timeline) -> tuple[Timeline, list[CallMark]]:
     return replace(line, keys=keys), line.in_order(CallMark)
 
 
+class _Places:
+    """Where calls end that run; by the codes' identities: one hashes all that is written in it."""
+
+    def __init__(self) -> None:
+        self._known = dict[int, tuple[CodeType, list[tuple[int, int]]]]()
+
+    def end_of(self, frame: FrameType) -> tuple[int, int]:
+        """Line and column at which the call ends that a frame is at."""
+        code = frame.f_code
+        if id(code) not in self._known:
+            ends = [(end or 0, column or 0) for _, end, _, column in code.co_positions()]
+            self._known[id(code)] = code, ends  # it is kept: no other one gets its place
+        return self._known[id(code)][1][frame.f_lasti // 2]
+
+
 @contextmanager
-def traced() -> Iterator[None]:
-    """Have calls leave marks; not for two threads at once."""
+def traced(path: str = "") -> Iterator[None]:
+    """Have calls leave marks; not for two threads at once.
+
+    ``path``: of the file whose ``callers`` are told, of calls in other files, too; by default
+    those in the file of each call are.
+    """
     methods: dict[str, Callable[..., Any]] = {
         name: method
         for kind in reversed(Timeline.__mro__)
@@ -79,14 +98,15 @@ def traced() -> Iterator[None]:
         if kind not in (object, TimelineData)
         if callable(method) and not name.startswith("_")
     }
+    places = _Places()
     runs, is_inside = Counter[tuple[str, tuple[int, int]]](), False
     entered = defaultdict[tuple[str, tuple[int, int]], dict[FrameType, int]](dict)
 
     def callers(frame: FrameType) -> Iterator[tuple[tuple[int, int], int]]:
-        file, outer = frame.f_code.co_filename, frame.f_back
+        file, outer = path or frame.f_code.co_filename, frame.f_back
         while outer is not None:
             if outer.f_code.co_filename == file:
-                site = _end_of(outer.f_code, outer.f_lasti)
+                site = places.end_of(outer)
                 known = entered[file, site]
                 yield site, known.setdefault(frame, len(known))
                 frame = outer
@@ -113,7 +133,7 @@ def traced() -> Iterator[None]:
                 given = dict(takes.bind(*args, **kwargs).arguments)
             before = given.pop("self")
             frame = sys._getframe(1)
-            place = (frame.f_code.co_filename, _end_of(frame.f_code, frame.f_lasti))
+            place = (frame.f_code.co_filename, places.end_of(frame))
             done = Call(name, *place, runs[place], given, tuple(callers(frame)), before)
             runs[place] += 1
             return unchecked(after, keys=(*after.keys, _mark(before, after, done)))
@@ -141,15 +161,6 @@ _signature = functools.cache(signature)
 
 def _is_single(parameter: Parameter) -> bool:
     return parameter.kind not in (Parameter.VAR_POSITIONAL, Parameter.VAR_KEYWORD)
-
-
-@functools.lru_cache(maxsize=256)
-def _ends(code: CodeType) -> tuple[tuple[int, int], ...]:
-    return tuple((end or 0, column or 0) for _, end, _, column in code.co_positions())
-
-
-def _end_of(code: CodeType, instruction: int) -> tuple[int, int]:
-    return _ends(code)[instruction // 2]
 
 
 def _mark(before: Timeline, after: Timeline, call: Call) -> CallMark:

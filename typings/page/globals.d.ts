@@ -23,6 +23,8 @@ interface Slot {
   why: string;
   of: string;
   is_member: boolean;
+  /** Of `a if x else b`: whether it is the one that was taken; null where that is not known. */
+  plays: boolean | null;
 }
 
 /** A call of the file; see `controller.studio.orders.Bar`. */
@@ -39,6 +41,9 @@ interface Bar {
   slots: Slot[];
   values: Record<string, number | string>;
   more: string[];
+  /** Where it is written, if that is another file. */
+  file: string;
+  line: number;
 }
 
 /** What the studio shows; see `controller.studio.session`. */

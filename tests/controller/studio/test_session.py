@@ -258,12 +258,18 @@ def test_an_exported_page_plays_the_song(studio: Studio, file: Path) -> None:
 def test_a_file_that_never_ends_is_stopped_and_the_next_one_runs(
     studio: Studio, file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(running, "LONGEST_RUN", 0.5)
+    process = studio._runner._process.pid
     endless = GREET.replace("    line = Time", "    while times: pass\n    line = Time")
     file.write_text(endless, encoding="utf-8")
     _look(studio)
-    assert "ran for longer than 0.5 s; it was stopped" in str(studio._server._error)
+    assert "ran for longer than 2 s; it was stopped" in str(studio._server._error)
+    file.write_text(GREET, encoding="utf-8")
+    _look(studio)
+    assert studio._server._error is None
+    assert studio._runner._process.pid == process, "the robot need not be loaded again"
+    monkeypatch.setattr(running, "LONGEST_WAIT", 0.5)
     for text, told in (
+        (GREET + "\nimport time\ntime.sleep(99)\n", "ran for longer than 0.5 s; it was stopped"),
         (GREET + "\nimport os\nos._exit(3)\n", "has ended the process"),
         (GREET + "\nimport sys\nsys.exit(3)\n", "the file ends the program"),
     ):
@@ -350,6 +356,76 @@ def test_a_loop_is_written_out_and_the_whole_undone(studio: Studio, file: Path) 
     assert 2 * line in file.read_text(encoding="utf-8")
     studio.edit({"op": "undo"})
     assert file.read_text(encoding="utf-8") == text
+
+
+def test_what_is_computed_is_written_out_once_its_lines_were_shown(
+    studio: Studio, file: Path
+) -> None:
+    text = GREET.replace("over=0.6).home", "over=sum((0.2, 0.4))).home")
+    text = text.replace('foot("FR"', 'foot("".join("FR")')
+    file.write_text(text, encoding="utf-8")
+    _look(studio)
+    editor = _editor(studio)
+    bar = [bar["name"] for bar in editor["bars"]].index("foot")
+    order: dict[str, object] = {"op": "write_out", "bar": bar, "base": editor["base"]}
+    offers = {"op": "offers", "site": editor["bars"][bar]["site"], "base": editor["base"]}
+    assert "write_out" in [offer["op"] for offer in _told(studio, offers)["offers"]]
+    told = _told(studio, {"op": "propose", "proposed": order, "base": editor["base"]})
+    assert (
+        '-        line = line.foot("".join("FR"), z=0.08, over=0.5).down("FR", over=0.5)'
+        in told["diff"]
+    )
+    assert '+        line = line.foot("FR", z=0.08, over=0.5).down("FR", over=0.5)' in told["diff"]
+    assert told["fixed"] == []
+    assert file.read_text(encoding="utf-8") == text, "shown only"
+    for wrong in ({"bar": 99}, {"bar": "a"}, {}):
+        assert "error" in _told(studio, {"base": editor["base"], "op": "write_out", **wrong})
+    assert "error" not in _told(studio, {**order, "commit": True})
+    assert file.read_text(encoding="utf-8") == text.replace('"".join("FR")', '"FR"')
+    studio.edit({"op": "undo"})
+    assert file.read_text(encoding="utf-8") == text
+
+
+def test_of_a_choice_it_is_told_which_value_plays(studio: Studio, file: Path) -> None:
+    chosen = "over=0.5 if times > 2 else 0.7).down"
+    text = GREET.replace("over=0.5).down", chosen).replace("deg(10.0)", "deg(8 if times else 10)")
+    file.write_text(text.replace("0.6).home", "0.6 if times else times * 0.7).home"), "utf-8")
+    _look(studio)
+    slots = {
+        bar["name"]: [(one["value"], one["plays"]) for one in bar["slots"]]
+        for bar in _editor(studio)["bars"]
+    }
+    assert slots["foot"] == [("FR", None), (0.08, None), (0.5, False), (0.7, True)]
+    assert slots["body"][:2] == [(8, True), (10, False)]
+    assert slots["body"][2] == (0.6, True)
+
+
+def test_bars_of_other_files_are_written_out_here_or_read_there(studio: Studio, file: Path) -> None:
+    helper = file.with_name("elsewhere.py")
+    helper.write_text(
+        "from motions import Timeline\n\n\ndef dip(deep: float) -> Timeline:\n"
+        "    return Timeline().body(z=-deep, over=0.5).home(over=0.5)\n",
+        encoding="utf-8",
+    )
+    text = GREET.replace("from motions", "from elsewhere import dip\nfrom motions").replace(
+        "line.home(over=0.6)", "line.home(over=0.6).then(dip(0.01 * times))"
+    )
+    file.write_text(text, encoding="utf-8")
+    _look(studio)
+    editor = _editor(studio)
+    (bar, *_) = (k for k, one in enumerate(editor["bars"]) if one["file"])
+    known = {"bar": bar, "base": editor["base"]}
+    read = _told(studio, {"op": "read", **known})
+    assert (read["line"], read["file"]) == (5, str(helper.resolve()))
+    assert read["text"] == helper.read_text(encoding="utf-8").splitlines()
+    assert "error" in _told(studio, {"op": "read", "bar": 0, "base": editor["base"]})
+    offers = {"op": "offers", "site": [0, 0], **known}
+    assert [offer["op"] for offer in _told(studio, offers)["offers"]] == ["write_out"]
+    order = {"op": "write_out", **known}
+    told = _told(studio, {"op": "propose", "proposed": order, "base": editor["base"]})
+    assert told["fixed"] == ["times"], "what it was called with is a number then"
+    assert "error" not in _told(studio, {**order, "commit": True})
+    assert ".then(Timeline().body(z=-0.01, over=0.5).home(over=0.5))" in file.read_text("utf-8")
 
 
 def test_an_empty_motion_is_shown_and_begun(studio: Studio, file: Path) -> None:

@@ -229,7 +229,10 @@ UP = Timeline().foot("FL", z=0.05, over=0.5)
         (lambda: Timeline().turn(90), r"turn of 90 rad looks like degrees: write deg\(90\)"),
         (lambda: Timeline().walk(), r"walk\(\) needs x, y or turn: where to; or over"),
         (lambda: Timeline().side_step(0.0), r"side_step\(\) needs y"),
-        (lambda: Timeline().turn(0.3, over=1.0), r"turn\(\): 1.00 s are too short: 1 round of"),
+        (
+            lambda: Timeline().turn(0.3, over=1.0),
+            r"turn\(\): 1.00 s are too short: 1 round of gait 'walk' takes",
+        ),
         (lambda: Timeline().walk(0.5, gait="trott"), "unknown gait 'trott'; valid: trot, walk"),
         (lambda: Timeline().walk(2.0, over=1.0), "1.00 s are too short: 17 rounds of gait 'walk'"),
         (lambda: Timeline().walk(2.0, over=-1.0), "over must be a number above 0, got -1.0"),

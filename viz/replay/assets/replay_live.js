@@ -19,8 +19,15 @@ function patched(message, known) {
   return { ...told, data: new ReplayData(whole.buffer, known.scene) };
 }
 
-// What the server of a live page shows now.
-async function fetched(known) {
+// What the server of a live page shows now; who asks meanwhile gets the same.
+/** @type {Promise<ReplayData> | null} */
+let fetching = null;
+function fetched(known) {
+  fetching ??= fetchedAnew(known).finally(() => { fetching = null; });
+  return fetching;
+}
+
+async function fetchedAnew(known) {
   const query = new URLSearchParams(location.search);
   query.set("has", known.header.version);
   const answer = await fetch(`data?${query}`);
@@ -105,7 +112,10 @@ function listen(player) {
   events.onmessage = async ({ data }) => {
     const state = JSON.parse(data);
     if (state.version !== version) {
-      if (state.version !== player.data.header.version) player.use(await fetched(player.data));
+      if (state.version !== player.data.header.version) {
+        const data = await fetched(player.data);
+        if (data !== player.data) player.use(data); // the studio may have shown it already
+      }
       version = player.data.header.version;
       sliders.use(player.data.header);
       studio?.use(player.data.header.editor);

@@ -31,21 +31,21 @@ class Inspector {
     }
     const times = bar.runs > 1 ? `, runs ${bar.runs} times` : "";
     const more = count > 1 ? ` and ${count - 1} more` : "";
-    const where = isOwn(bar) ? `line ${bar.site[0]}${times}` : "in another file";
+    const where = isOwn(bar) ? `line ${bar.site[0]}${times}` : `in ${placeOf(bar)}`;
     title.replaceChildren(element("b", { textContent: described(bar)[0] + more }), ` ${bar.name}(), ${where}`);
     rows.replaceChildren(...bar.slots.map((slot) => this.row(bar, slot, editor, timeUnit)));
     if (!isOwn(bar)) rows.append(element("p", { textContent: elsewhere(bar, editor.bars) }));
     if (bar.broken) rows.append(element("p", { className: "broken", textContent: bar.broken }));
     if (isOwn(bar) && bar.more.length) rows.append(this.adder(bar, editor));
-    if (isOwn(bar)) this.offer(bar, rows);
+    this.offer(bar, rows);
     return null;
   }
 
   // Ways to make what is computed a number of its own, asked for where there is such.
   async offer(bar, rows) {
     const { shape } = this;
-    if (bar.runs < 2 && bar.slots.every((slot) => slot.span)) return;
-    const offers = await this.studio.offers(bar);
+    if (isOwn(bar) && bar.runs < 2 && bar.slots.every((slot) => slot.span)) return;
+    const offers = await this.studio.proposals.of(bar);
     if (shape === this.shape && offers.length) rows.append(buttonsOf(offers));
   }
 
@@ -121,7 +121,8 @@ class Inspector {
       if (!isWord) this.resting = setTimeout(() => send(false), DRAFT_REST);
     });
     input.addEventListener("change", () => this.isGivenUp || send(true));
-    const note = slot.place ? `${unit} · ${slot.place}` : unit;
+    const plays = { true: "this one plays", false: "does not play now" }[String(slot.plays)];
+    const note = [plays, unit, slot.place].filter(Boolean).join(" · ");
     row.append(input, element("small", { textContent: note, title: note }));
     return row;
   }

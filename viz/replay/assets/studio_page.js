@@ -5,7 +5,6 @@
 const NUDGE = 0.05; // s, what a key makes a call longer or shorter
 const BEAT_NUDGE = 0.25; // beats, the same where the motion counts in beats
 const LIFT_AND_DOWN = "Lift and put down"; // of the palette, two calls
-const SLOWER = 1.2; // what the whole is slowed down by at first, where that is asked for
 const SNAP = 8; // px, a bar that ends this near a beat ends on it
 
 class Studio {
@@ -26,6 +25,7 @@ class Studio {
     this.doing = new Doing(this);
     this.tools = new Tools(this);
     this.inspector = new Inspector(this);
+    this.proposals = new Proposals(this);
     this.hands = new Hands(this);
     this.onion = new Onion(this);
     this.library = new Library(this);
@@ -242,22 +242,6 @@ class Studio {
     return (begun.pop() ?? own.pop())?.site;
   }
 
-  // What else can be done with a call, such as writing out its loop: orders with their titles.
-  async offers({ site, number }) {
-    const answer = await this.post("edit", { op: "offers", site, number, base: this.editor.base });
-    const offers = /** @type {(Order & { title: string })[]} */ (answer.offers ?? []);
-    return offers.map(({ title, ...order }) => ({
-      text: title, hint: "changes the file; Undo takes it back", act: () => this.rewrite({ value: SLOWER, ...order, site, number }),
-    }));
-  }
-
-  /** @param {Order} order */
-  rewrite(order) {
-    this.made = { count: 1 };
-    this.inspector.forget();
-    this.send(order, true);
-  }
-
   // A number or word for an argument of the chosen call; a draft is shown, but not saved. Jumps are
   // solved, which takes up to half a minute: only when they are let go.
   /**
@@ -327,7 +311,7 @@ class Studio {
     this.tell(isCommitted ? "saving…" : "checking…");
     const asked = performance.now();
     const chosen = String([...this.chosen]);
-    const answer = await this.post("edit", { ...order, base: this.editor.base, commit: isCommitted });
+    const answer = await this.post("edit", { base: this.editor.base, ...order, commit: isCommitted });
     if (answer.data) {
       this.player.use(answer.data);
       this.redrawDraft(this.player.data.header.editor);
@@ -368,7 +352,7 @@ class Studio {
     } catch {
       return;
     }
-    this.player.use(data);
+    if (data !== this.player.data) this.player.use(data);
     this.use(this.player.data.header.editor, site);
   }
 

@@ -115,11 +115,17 @@ function toldOf(bar, bars) {
  * @param {Bar} bar
  * @param {Bar[]} bars
  */
-function elsewhere({ span }, bars) {
+function elsewhere(bar, bars) {
+  const { span } = bar;
   const around = bars.filter((one) => isOwn(one) && one.parts.includes("time") && one.span[0] <= span[0] + 1e-6 && span[2] <= one.span[2] + 1e-6);
   const [whole] = around.sort((a, b) => a.span[2] - a.span[0] - b.span[2] + b.span[0]);
   const which = whole ? `It is part of ${described(whole)[0]}, which is written` : "It is written";
-  return `${which} in another file: it can be changed only there.`;
+  return `${which} in another file, ${placeOf(bar)}: it is changed there, or written out here.`;
+}
+
+/** @param {Bar} bar */
+function placeOf({ file, line }) {
+  return `${file.split(/[\\/]/).pop()}, line ${line}`;
 }
 
 /**
