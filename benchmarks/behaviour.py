@@ -6,7 +6,7 @@ followed is in ``locomotion``, what pushes are survived in ``balance``.
 
 import math
 
-from benchmarks import demo_sequence, high_five, library, model
+from benchmarks import demo_sequence, high_five, library
 from benchmarks.command import Benchmark
 from benchmarks.robots import standing_failure, way_between
 from benchmarks.study import Study, TrialResult
@@ -76,8 +76,6 @@ def measure_goals(trial: Trial, found: TrialResult) -> None:
 
 
 STUDIES: tuple[Study, ...] = (
-    model.AGREEMENT,
-    model.SOLUTIONS,
     Study("stand", {"lying -> standing": STAND}, measure_stand),
     Study("goals", GOALS, measure_goals, "goal"),
     high_five.HELD,

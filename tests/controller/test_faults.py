@@ -10,9 +10,7 @@ import pytest
 from controller import GO2Controller, Mode
 from go2_wbc.config import Config
 from go2_wbc.errors import (
-    ClosedError,
     ModeError,
-    PlantError,
     PlantTimeout,
 )
 from go2_wbc.plant import MujocoPlant
@@ -135,29 +133,6 @@ def test_a_clock_that_does_not_go_on_and_a_state_that_is_not_finite_end_the_call
     assert f"no {lack} state" in go2.last_outcome.reason
 
 
-def test_physics_that_diverges_ends_the_call_with_the_reason(
-    plant: WatchedPlant, go2: GO2Controller
-) -> None:
-    def explode() -> None:
-        plant.inner.data.qvel[:] = 1e12
-
-    plant.once_at(MID_RISE, explode)
-    with pytest.raises(PlantError, match=r"physics failed at t=1\.5"):
-        go2.stand()
-    assert go2.mode is Mode.DAMPED
-
-
-def test_in_realtime_a_plant_that_fails_ends_the_waiting_call(plant: WatchedPlant) -> None:
-    plant.from_time(0.1, failing(PlantTimeout("the robot does not answer")))
-    with GO2Controller(plant=plant, realtime=True) as go2:
-        with pytest.raises(PlantTimeout):
-            in_thread(go2.stand).result(HANG_GUARD)
-        assert go2.mode is Mode.DAMPED
-        assert "the robot does not answer" in go2.last_outcome.reason
-        with pytest.raises(PlantError, match="close this controller and make a new one"):
-            in_thread(lambda: go2.wait(1.0)).result(HANG_GUARD)
-
-
 # --- other threads ----------------------------------------------------------------------------
 
 
@@ -174,22 +149,6 @@ def test_damp_from_another_thread_ends_the_call_honestly(
         assert call.result(HANG_GUARD) is False
         assert go2.mode is Mode.DAMPED
         assert go2.last_outcome.reason == "damped by damp()"
-
-
-@pytest.mark.parametrize("realtime", [False, True])
-def test_close_from_another_thread_ends_the_call(plant: WatchedPlant, *, realtime: bool) -> None:
-    under_way = threading.Event()
-    plant.once_at(0.1, under_way.set)
-    go2 = GO2Controller(plant=plant, realtime=realtime)
-    call = in_thread(lambda: go2.wait(1e6))
-    assert under_way.wait(HANG_GUARD)
-    in_thread(go2.close).result(HANG_GUARD)
-    ticks = len(plant.commands)
-    assert is_limp(plant.commands[-1])
-    with pytest.raises(ClosedError):
-        call.result(HANG_GUARD)
-    assert "closed during a call" in go2.last_outcome.reason
-    assert len(plant.commands) == ticks
 
 
 # --- robots that cannot -----------------------------------------------------------------------
@@ -211,15 +170,6 @@ def test_a_robot_pushed_over_in_the_middle_of_a_call_says_that_it_fell(
     with pytest.raises(ModeError, match="fallen"):
         go2.move(0.1)
     go2.wait(0.1)
-    assert go2.mode is Mode.FALLEN
-
-
-def test_a_fall_while_waiting_is_reported(plant: WatchedPlant, go2: GO2Controller) -> None:
-    assert go2.stand()
-    plant.inner.push(SHOVE, 0.2)
-    go2.wait(1.0)
-    assert not go2.last_outcome
-    assert "fell at t=" in go2.last_outcome.reason
     assert go2.mode is Mode.FALLEN
 
 

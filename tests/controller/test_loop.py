@@ -126,20 +126,6 @@ def test_infeasible_qps_are_logged_and_the_residual_table_once_in_a_tumble(
         assert caplog.text.count(row) == 1
 
 
-def test_qp_failures_in_a_row_damp_the_robot_for_good_at_the_limit(
-    loop: ControlLoop, plant: StillPlant, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    break_qp(monkeypatch, lambda n: n < SAFETY.qp_patience)
-    loop.engage(Balance(loop.model))
-    run(loop, SAFETY.qp_patience - 1)
-    assert loop.fault is None
-    run(loop, 20)
-    reason = f"damped after {SAFETY.qp_patience} QP failures in a row"
-    assert fault_of(loop).reason.startswith(reason)
-    assert loop.telemetry.qp_failures == SAFETY.qp_patience
-    assert all(is_limp(command) for command in plant.commands[1:])
-
-
 def test_failures_that_are_not_in_a_row_do_not_add_up(
     loop: ControlLoop, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -247,25 +233,6 @@ def test_a_slow_period_and_a_short_silence_are_borne_with(
     assert loop.fault is None
 
 
-@pytest.mark.parametrize("name", ["q", "v"])
-def test_a_state_that_is_not_finite_is_passed_over_for_a_while_and_then_reported(
-    loop: ControlLoop, plant: StillPlant, name: str
-) -> None:
-    loop.engage(Balance(loop.model))
-    run(loop, 3)
-    good = loop.state
-    broken = getattr(good, name).copy()
-    broken[4] = np.nan
-    plant.state = replace(plant.state, **{name: broken})
-    run(loop, BORNE - 1)
-    assert loop.state is good
-    with pytest.raises(PlantTimeout, match="no finite state from the plant"):
-        run(loop, 10)
-    assert loop.fault is not None
-    assert np.isfinite(loop.snapshot.state.q).all()
-    assert is_limp(plant.commands[-1])
-
-
 def test_a_plant_without_a_finite_first_state_is_refused(
     plant: StillPlant, model: RobotModel
 ) -> None:
@@ -274,43 +241,7 @@ def test_a_plant_without_a_finite_first_state_is_refused(
         ControlLoop(plant, model, WholeBodyController(model), Telemetry(model, 10), SAFETY)
 
 
-@pytest.mark.parametrize(
-    "error", [PlantTimeout("no answer"), PlantError("leg lost"), OSError("io")]
-)
-def test_whatever_the_plant_raises_comes_out_and_damps_the_robot(
-    loop: ControlLoop, plant: StillPlant, error: Exception
-) -> None:
-    loop.engage(Balance(loop.model))
-    loop.tick()
-
-    def fail_once() -> None:
-        plant.on_write = lambda: None
-        raise error
-
-    plant.on_write = fail_once
-    with pytest.raises(type(error), match=str(error)):
-        loop.tick()
-    assert str(error) in fault_of(loop).reason
-    assert is_limp(plant.commands[-1])
-    loop.tick()
-    assert is_limp(plant.commands[-1])
-
-
 # --- falls ------------------------------------------------------------------------------------
-
-
-def test_a_balancing_robot_that_tilts_too_far_has_fallen(
-    loop: ControlLoop, plant: StillPlant
-) -> None:
-    loop.engage(Balance(loop.model))
-    tilt(plant, SAFETY.tilt_limit - 0.05)
-    loop.tick()
-    assert loop.fault is None
-    tilt(plant, SAFETY.tilt_limit + 0.05)
-    loop.tick()
-    assert fault_of(loop).is_fall
-    assert fault_of(loop).reason.startswith("fell at t=0.00 s: roll 63 deg")
-    assert is_limp(plant.commands[-1])
 
 
 def test_a_robot_whose_legs_have_folded_has_fallen(loop: ControlLoop, plant: StillPlant) -> None:

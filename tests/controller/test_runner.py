@@ -109,36 +109,12 @@ def test_an_interruption_between_two_calls_damps_at_once(runner: Runner, plant: 
     assert is_limp(plant.commands[0])
 
 
-def test_an_interruption_from_within_a_tick_ends_the_call(
-    runner: Runner, plant: StillPlant
-) -> None:
-    def interrupt_once() -> None:
-        plant.on_write = lambda: None
-        runner.interrupt("a test")
-
-    plant.on_write = interrupt_once
-    assert not runner.advance_until(lambda: False, FOREVER)
-    assert runner.loop.fault == Fault("a test")
-
-
 def under_way(runner: Runner) -> Future[bool]:
     """A call without an end, which another thread makes."""
     begun = threading.Event()
     call = in_thread(lambda: runner.advance_until(lambda: bool(begun.set()), FOREVER))
     wait_for(begun)
     return call
-
-
-@pytest.mark.parametrize("realtime", [False, True])
-def test_an_interruption_from_another_thread_ends_a_long_call(
-    make_runner: MakeRunner, *, realtime: bool
-) -> None:
-    # Without realtime the call holds the lock all the time; the interruption must not wait for it.
-    runner = make_runner(realtime=realtime)
-    call = under_way(runner)
-    in_thread(lambda: runner.interrupt("a test")).result(HANG_GUARD)
-    assert call.result(HANG_GUARD) is False
-    assert runner.loop.fault == Fault("a test")
 
 
 @pytest.mark.parametrize("realtime", [False, True])

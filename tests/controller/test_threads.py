@@ -101,15 +101,6 @@ def test_a_robot_that_cannot_come_to_rest_walks_on_and_takes_commands(
     assert go2.stand()
 
 
-def test_a_second_play_is_refused_and_the_first_goes_on(
-    go2: GO2Controller, plant: WatchedPlant
-) -> None:
-    assert go2.stand()
-    refused = refusals(plant, go2.state.time + 1.5, lambda: go2.play("bow", check=False))
-    assert go2.play("nod", check=False)
-    assert refused == ["play() while play() is still running"]
-
-
 def test_stop_does_not_disturb_what_is_no_walk(go2: GO2Controller, plant: WatchedPlant) -> None:
     assert go2.stand()
     plant.once_at(go2.state.time + 1.5, lambda: in_thread(go2.stop).result(HANG_GUARD))

@@ -14,9 +14,7 @@ from benchmarks.study import chosen_studies
 from tests.unchecked import run_trials
 
 ROWS = {
-    "behaviour": (
-        *("library", "solutions", "slaps", "sequence", "high-five", "model", "stand", "goals"),
-    ),
+    "behaviour": ("library", "slaps", "sequence", "high-five", "stand", "goals"),
     "locomotion": ("ahead-0.5", "ahead-1.0", "aside-0.5", "turn-2"),
     "balance": ("stand-0", "stand-90", "trot-lateral"),
 }

@@ -2,8 +2,10 @@
 
 import pytest
 
+from benchmarks import combined
 from benchmarks.rough import LATEST, UnreliablePlant
-from controller.sweeps.trials import TrialRobot
+from benchmarks.study import TrialResult
+from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.plant import MujocoPlant
 
 
@@ -13,18 +15,15 @@ from go2_wbc.plant import MujocoPlant
     ("friction", "payload", "speed"), [(0.2, 0.0, 1.0), (0.3, 4.0, 0.5), (0.2, 4.0, 1.0)]
 )
 def test_a_robot_whose_commands_are_late_walks_on_slippery_ground_with_a_load(
-    friction: float, payload: float, speed: float, sensors: str
+    friction: float, payload: float, speed: float, sensors: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It fell within its first second, 20 of 20 times."""
-    plant = MujocoPlant(friction=friction, payload=payload, delay=0.01, sensors=sensors)
-    with TrialRobot(plant) as robot:
-        robot.require(robot.go2.stand())
-        robot.require(robot.go2.walk())
-        robot.go2.move(speed)
-        robot.wait(4.0)
-        robot.go2.stop()
-        robot.require(robot.go2.last_outcome.ok)
-        robot.require(robot.go2.stand())
+    settings = {"LOADS": (payload,), "WALKS": (speed,), "WALK_TIME": 4.0, "FIRST_SEED": 0}
+    for name, value in settings.items():
+        monkeypatch.setattr(combined, name, value)
+    found = TrialResult()
+    combined.measure_combined(Trial(0, sensors=sensors), found, 0.01, friction)
+    assert found.notes == {}
 
 
 def test_a_robot_whose_commands_come_late_by_turns_is_sound_and_walks_on_level_ground() -> None:

@@ -6,19 +6,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from jaxtyping import Float
 
 from controller import GO2Controller
 from controller.behaviours.walking import Walking
+from controller.sweeps.trials import TrialRobot, set_off
 from controller.walker import CHANGE_SHARE, Walker
 from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS
-from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
+from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.envelopes import DWELL, envelope_of
 from go2_wbc.planning.gait_clock import time_between
 from go2_wbc.planning.ground import MOST_FRICTION
 from go2_wbc.planning.locomotion import LocomotionConfig
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 from go2_wbc.robot.model import RobotModel
 
 FRICTION = 0.7
@@ -30,29 +31,29 @@ STRIDE = np.full(150, 1.0 / 150)
 FAST = 9.0  #: m/s, rad/s: beyond every envelope, so that it is clipped to it
 
 
+def mean_velocity(robot: TrialRobot, until: float, time: float) -> Float[np.ndarray, "3"]:
+    """Of the CoM [m/s], from some time on and for as long [s]; a fall fails."""
+    robot.wait(until)
+    robot.truth.clear()
+    robot.wait(time)
+    return robot.truth.recording().com_velocity.mean(axis=0)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(GAITS.keys() - {"trot"}))
 def test_a_gait_walks_at_the_edge_of_its_envelope_and_comes_to_rest(name: str) -> None:
-    truth = GroundTruth(MujocoPlant(friction=FRICTION, seed=41))
-    with GO2Controller(plant=truth) as go2:
-        assert go2.stand()
-        assert go2.walk(name)
-        go2.move(FAST)
+    with TrialRobot(MujocoPlant(friction=FRICTION, seed=41)) as robot:
+        go2 = robot.go2
+        set_off(robot, name, VelocityCommand(FAST))
         wanted = go2.command.linear_x
         assert wanted == pytest.approx(envelope_of(GAITS[name], VelocityEnvelope()).forward)
-        go2.wait(2.0)
-        truth.clear()
-        go2.wait(2.0)
-        speed = float(truth.recording().com_velocity[:, 0].mean())
-        assert speed == pytest.approx(wanted, rel=SLOW)
+        assert mean_velocity(robot, 2.0, 2.0)[0] == pytest.approx(wanted, rel=SLOW)
         for aside, turning in ((FAST, 0.0), (0.0, -FAST)):
             go2.move(0.0, turning, linear_y=aside)
-            go2.wait(1.5)
+            robot.wait(1.5)
         go2.stop()
-        assert go2.stand()
-        assert truth.fall() is None
+        robot.require(go2.stand())
         assert np.abs(go2.state.v[:6]).max() < 0.1
-    truth.close()
 
 
 @pytest.mark.slow
@@ -66,71 +67,51 @@ def test_a_bound_turns_at_once_on_ground_of_which_nothing_is_known(turn: float) 
 @pytest.mark.slow
 def test_a_pace_needs_no_more_friction_than_a_narrow_stance_does() -> None:
     # With its feet as far apart as a trot's it fell here: it pushed them aside by half its weight.
-    truth = GroundTruth(MujocoPlant(sensors="imu", friction=0.4, seed=71))
-    with GO2Controller(plant=truth) as go2:
-        assert go2.stand()
-        assert go2.walk("pace")
-        go2.move(0.5)
-        go2.wait(2.0)
-        truth.clear()
-        go2.wait(2.0)
-        velocity = truth.recording().com_velocity.mean(axis=0)
-        np.testing.assert_allclose(velocity, [0.5, 0.0, 0.0], atol=0.03)
-        go2.stop()
-        assert go2.stand()
-        assert truth.fall() is None
-    truth.close()
+    with TrialRobot(MujocoPlant(sensors="imu", friction=0.4, seed=71)) as robot:
+        set_off(robot, "pace", VelocityCommand(0.5))
+        np.testing.assert_allclose(mean_velocity(robot, 2.0, 2.0), [0.5, 0.0, 0.0], atol=0.03)
+        robot.go2.stop()
+        robot.require(robot.go2.stand())
 
 
 @pytest.mark.slow
 def test_gaits_pass_over_into_one_another_while_the_robot_walks() -> None:
     # It came to rest before every change.
-    truth = GroundTruth(MujocoPlant(friction=FRICTION, seed=43))
-    with GO2Controller(plant=truth) as go2:
-        assert go2.stand()
-        assert go2.walk()
-        go2.move(FAST)
-        go2.wait(2.0)
+    with TrialRobot(MujocoPlant(friction=FRICTION, seed=43)) as robot:
+        go2 = robot.go2
+        set_off(robot, "trot", VelocityCommand(FAST))
+        robot.wait(2.0)
         for name in CHANGES:
-            truth.clear()
-            assert go2.walk(name)
-            go2.wait(1.0)
+            robot.truth.clear()
+            robot.require(go2.walk(name))
+            robot.wait(1.0)
             most = envelope_of(GAITS[name], VelocityEnvelope()).forward
             assert go2.command.linear_x <= most * (1.0 + 1e-9)
-            ahead = truth.recording().com_velocity[:, 0]
+            ahead = robot.truth.recording().com_velocity[:, 0]
             assert np.convolve(ahead, STRIDE, "valid").min() > 0.15
         assert go2.command.linear_x > 0.0
         go2.stop()
-        assert go2.stand()
-        assert truth.fall() is None
-    truth.close()
+        robot.require(go2.stand())
 
 
 @pytest.mark.slow
 def test_a_command_that_comes_with_a_gait_is_followed_once_the_gait_is_there() -> None:
     """Of 250 runs of ten changes of gait, each with a command at once, 3 fell half-way."""
-    truth = GroundTruth(MujocoPlant(friction=FRICTION, seed=73))
-    with GO2Controller(plant=truth) as go2:
-        assert go2.stand()
-        assert go2.walk("walk")
-        go2.move(-0.2)
-        go2.wait(1.0)
+    with TrialRobot(MujocoPlant(friction=FRICTION, seed=73)) as robot:
+        go2 = robot.go2
+        set_off(robot, "walk", VelocityCommand(-0.2))
+        robot.wait(1.0)
         asked = go2.state.time
-        assert go2.walk("gallop")
+        robot.require(go2.walk("gallop"))
         go2.move(-0.8)
         assert go2.command.linear_x == -0.8
-        truth.clear()
+        robot.truth.clear()
         is_there = asked + time_between(GAITS["walk"], GAITS["gallop"])
-        go2.wait(is_there - go2.state.time)
+        robot.wait(is_there - go2.state.time)
         slow = envelope_of(GAITS["walk"], VelocityEnvelope()).scaled(CHANGE_SHARE).backward
-        speed = np.convolve(truth.recording().com_velocity[:, 0], STRIDE, "valid")
+        speed = np.convolve(robot.truth.recording().com_velocity[:, 0], STRIDE, "valid")
         assert speed.min() > -slow - 0.15
-        go2.wait(1.0)
-        truth.clear()
-        go2.wait(1.0)
-        speed = truth.recording().com_velocity[:, 0]
-        assert float(speed.mean()) == pytest.approx(-0.8, rel=2.0 * SLOW)
-    truth.close()
+        assert mean_velocity(robot, 1.0, 1.0)[0] == pytest.approx(-0.8, rel=2.0 * SLOW)
 
 
 def test_a_change_of_gait_within_another_one_waits_for_both() -> None:
@@ -167,26 +148,20 @@ def test_what_a_foot_has_shown_of_ice_is_kept_for_the_next_walk(
 
 @pytest.mark.slow
 def test_auto_goes_from_walk_to_flying_trot_and_back_to_rest() -> None:
-    truth = GroundTruth(MujocoPlant(friction=FRICTION, seed=44))
-    with GO2Controller(plant=truth) as go2:
-        assert go2.stand()
-        assert go2.walk("auto")
+    with TrialRobot(MujocoPlant(friction=FRICTION, seed=44)) as robot:
+        go2 = robot.go2
+        set_off(robot, "auto", ZERO_COMMAND)
         walking = go2._pilot._walker.walking
         for speed, name in ((0.3, "walk"), (0.9, "trot"), (2.0, "flying_trot")):
             go2.move(speed)
-            go2.wait(3.0)
+            robot.wait(3.0)
             assert walking.gait.name == name
-            truth.clear()
-            go2.wait(1.5)
-            mean = float(truth.recording().com_velocity[:, 0].mean())
-            assert mean == pytest.approx(speed, rel=SLOW)
-        assert go2.walk("trot")
+            assert mean_velocity(robot, 0.0, 1.5)[0] == pytest.approx(speed, rel=SLOW)
+        robot.require(go2.walk("trot"))
         assert walking.choice is None
         assert go2.command.linear_x <= envelope_of(GAITS["trot"], None).forward * (1.0 + 1e-9)
-        assert go2.walk("auto")
+        robot.require(go2.walk("auto"))
         go2.stop()
-        go2.wait(1.0)
+        robot.wait(1.0)
         assert walking.gait.name == "walk"
-        assert go2.stand()
-        assert truth.fall() is None
-    truth.close()
+        robot.require(go2.stand())

