@@ -46,6 +46,9 @@ from go2_wbc.tracking.landing import Landing, Landings, land
 from go2_wbc.tracking.plan_curves import StanceLoad
 from go2_wbc.tracking.trunk_firmness import hold_firmly
 
+FIRM_AFTER = 0.15
+"""Time [s] on three feet or more after which the trunk is held firmly: a trot stands on four between
+its steps, and a trunk that rolled by 26 deg meanwhile went 38 mm aside as it was held then."""
 PAIR = 2  #: Feet that hold a trunk along the line between them, and not across it
 HEIGHT_PER_WEIGHT = 0.00055
 """Correction [m/N] that a payload's weight takes; this and the next two as found with 2 to 6 kg, up
@@ -74,6 +77,7 @@ class Correction(Record):
     upward [m], about the axis ahead and the one aside [rad]."""
     knows_payload: bool  #: whether ``carried`` has been found yet
     friction: Array6  #: what is learned of it, see ``trunk_firmness``
+    held: float  #: for how long more than two feet have stood [s]
 
 
 class Tracking(Record):
@@ -177,8 +181,9 @@ def follow(
     note(now, error, s, target)
     is_held = standing_feet(target) > PAIR
     correct(now, error, dt if is_held else 0.0, s.correction, target)
-    if is_held and target.force_weight == 0.0:  # else solved, with forces of its own
-        c = s.correction
+    c = s.correction
+    c.held = c.held + dt if is_held else 0.0
+    if c.held >= FIRM_AFTER and target.force_weight == 0.0:  # else solved, with forces of its own
         lead = hold_firmly(now, error, c.offset, dt, c.friction, target)
         for i in range(3):
             target.p_world[i] += lead[i]
