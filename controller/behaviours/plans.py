@@ -333,6 +333,7 @@ that is too weak, or carries too much, stops where it is."""
 class PlayPlan(Behaviour):
     """Play a plan where the robot stands."""
 
+    is_firm = True  #: Whether the trunk is held to the plan against the friction of the joints
     _anchor: Anchor
     _tracker: PlanTracker
     _approach: Approach
@@ -352,7 +353,7 @@ class PlayPlan(Behaviour):
         super().start(snapshot)
         self._last = self._start
         self._anchor = anchor_of(self.plan, snapshot.p_world_feet, snapshot.foot_radius)
-        self._tracker = PlanTracker(self._anchor, self.plan.footsteps)
+        self._tracker = PlanTracker(self._anchor, self.plan.footsteps, is_firm=self.is_firm)
         self._approach = Approach.of(self.plan, self._anchor, snapshot)
         self._weight = FeltWeight(self._friction)
 
@@ -430,6 +431,7 @@ class ChangePosture(PlayPlan):
     """Play a plan that starts from the measured pose of the body."""
 
     knows_payload = True
+    is_firm = False
 
     def __init__(self, make_plan: Callable[[Float[np.ndarray, "6"]], MotionPlan]) -> None:
         """Args: make_plan: from the pose (6,) of its point in the feet's frame to the plan."""

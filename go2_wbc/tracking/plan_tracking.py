@@ -78,6 +78,7 @@ class Correction(Record):
     knows_payload: bool  #: whether ``carried`` has been found yet
     friction: Array6  #: what is learned of it, see ``trunk_firmness``
     held: float  #: for how long more than two feet have stood [s]
+    is_firm: bool  #: whether the trunk is held firmly then
 
 
 class Tracking(Record):
@@ -97,9 +98,12 @@ class Tracking(Record):
 class PlanTracker:
     """Turns a plan's references, one a tick, into what is tracked in the world."""
 
-    def __init__(self, anchor: Anchor, footsteps: Footsteps | None = None) -> None:
-        """Follow a plan at ``anchor``, without correction at first."""
+    def __init__(
+        self, anchor: Anchor, footsteps: Footsteps | None = None, *, is_firm: bool = False
+    ) -> None:
+        """Follow a plan at ``anchor``, without correction at first; ``is_firm``: the trunk too."""
         self._state = Tracking(landing=Landing.at(anchor))
+        self._state.correction.is_firm = is_firm
         self._events, self._changes, self._load = np.zeros(0), np.zeros((0, 4, 3)), _NO_LOAD
         if footsteps is not None:
             contacts, steps = footsteps.contacts, footsteps
@@ -183,7 +187,7 @@ def follow(
     correct(now, error, dt if is_held else 0.0, s.correction, target)
     c = s.correction
     c.held = c.held + dt if is_held else 0.0
-    if c.held >= FIRM_AFTER and target.force_weight == 0.0:  # else solved, with forces of its own
+    if c.is_firm and c.held >= FIRM_AFTER and target.force_weight == 0.0:  # else solved, with forces
         lead = hold_firmly(now, error, c.offset, dt, c.friction, target)
         for i in range(3):
             target.p_world[i] += lead[i]
