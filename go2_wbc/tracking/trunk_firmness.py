@@ -35,8 +35,7 @@ STIFFNESS = (0.0, 0.0, 150.0, 1300.0, 300.0, 320.0)
 DAMPING = (0.0, 0.0, 6.0, 50.0, 12.0, 15.0)
 """K [1/s^2] and D [1/s], beside the gains of the tasks: of ahead, left, up, roll, pitch, yaw. By
 them friction of 0.2 N m leaves 0.6 deg of roll and less of the others; commands may be 12 ms late.
-A robot whose joints have no friction rolled to and fro by 1 deg at rest, as half of 0.2 N m was fed
-forward; no longer. Ahead and aside a push is to move a robot that then steps as it did."""
+Ahead and aside a push is to move a robot that then steps as it did."""
 LEARNING = 10.0  #: Rate [1/s]
 SLOW_WAY, SLOW_TURN = 0.003, 0.01
 """Planned speed [m/s], [rad/s] from which on c counts; 1 deg in 1.2 s is 0.02 rad/s at most."""
