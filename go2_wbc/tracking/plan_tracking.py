@@ -47,8 +47,8 @@ from go2_wbc.tracking.plan_curves import StanceLoad
 from go2_wbc.tracking.trunk_firmness import hold_firmly
 
 FIRM_AFTER = 0.15
-"""Time [s] on three feet or more after which the trunk is held firmly: a trot stands on four between
-its steps, and a trunk that rolled by 26 deg meanwhile went 38 mm aside as it was held then."""
+"""Time [s] on three feet or more after which the trunk is held firmly: a trot stands on four
+between its steps, and a trunk that rolled by 26 deg meanwhile went 38 mm aside as it was held."""
 PAIR = 2  #: Feet that hold a trunk along the line between them, and not across it
 HEIGHT_PER_WEIGHT = 0.00055
 """Correction [m/N] that a payload's weight takes; this and the next two as found with 2 to 6 kg, up
@@ -187,7 +187,8 @@ def follow(
     correct(now, error, dt if is_held else 0.0, s.correction, target)
     c = s.correction
     c.held = c.held + dt if is_held else 0.0
-    if c.is_firm and c.held >= FIRM_AFTER and target.force_weight == 0.0:  # else solved, with forces
+    is_solved = target.force_weight != 0.0  # with forces of its own
+    if c.is_firm and c.held >= FIRM_AFTER and not is_solved:
         lead = hold_firmly(now, error, c.offset, dt, c.friction, target)
         for i in range(3):
             target.p_world[i] += lead[i]
