@@ -2,34 +2,90 @@
 
 import pytest
 
-from benchmarks import faults
-from benchmarks.faults import ENCODERS, FEET, HELD_FOOT, IMU, MOTORS, Break
-from benchmarks.study import TrialResult
 from controller import GO2Controller
 from controller.modes import Mode
-from controller.sweeps.trials import Trial
+from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.plant import MujocoPlant
 
-GRAVE = ("calf-dead", "stuck")
-"""What a trot is not to go on with: the robot goes limp before it falls."""
+NAMED_WITHIN = 0.5  # [s]
+SURVIVED = [
+    ("encoder", "FL_calf_joint", None),
+    ("foot_force", "RR_foot", None),
+    ("foot_force", "FR_foot", 40.0),
+    ("gyro", "y", None),
+    ("accelerometer", "z", None),
+    ("foot_held", "FL_foot", None),
+    ("motor", "FL_calf_joint", 0.5),
+]
+GRAVE = [
+    ("motor", "RR_calf_joint", "motor of RR_calf_joint is dead"),
+    ("encoder_stuck", "FL_calf_joint", "FL_calf_joint reads the same"),
+]
+
+
+def trotting(plant: MujocoPlant) -> GO2Controller:
+    go2 = GO2Controller(plant=plant)
+    assert go2.stand()
+    assert go2.walk()
+    go2.move(0.5)
+    go2.wait(1.5)
+    return go2
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "what", [*MOTORS[2:], *ENCODERS, *FEET[:2], *IMU, HELD_FOOT], ids=lambda what: what.name
-)
-def test_what_breaks_of_a_trotting_robot_is_named_and_it_goes_on_or_limp(
-    what: Break, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(faults, "STATES", ("trotting",))
-    monkeypatch.setattr(faults, "FIRST_SEED", 0)
-    found = TrialResult()
-    faults.measure_break(Trial(0, sensors="imu"), found, what)
-    goes_on = float(what.name not in GRAVE)
-    expected = {"named": 1.0, "falls": 0.0, "goes-on": goes_on, "others": 0.0}
-    assert found.values == {f"trotting-{name}": value for name, value in expected.items()}, found
-    health, _, reason = found.notes["trotting"].partition(": ")[2].partition("; ")
-    assert health in reason or what.name == "half"
+@pytest.mark.parametrize(("kind", "part", "value"), SURVIVED)
+def test_a_robot_goes_on_without_a_part(kind: str, part: str, value: float | None) -> None:
+    plant = MujocoPlant(sensors="imu", seed=41)
+    with trotting(plant) as go2:
+        plant.fault(kind, part=part, value=value)
+        broken = plant.time
+        go2.wait(3.0)
+        assert go2.mode is Mode.WALKING
+        (fault,) = go2.health.faults
+        assert part in fault.part or kind == fault.part
+        assert fault.since < broken + NAMED_WITHIN
+        assert go2.stand() or kind == "motor"
+        assert str(fault) in go2.last_outcome.reason or kind == "motor"
+        assert str(fault) in str(go2.health)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sensors", ["ideal", "imu"])
+def test_a_robot_walks_without_any_sensor_of_its_feet(sensors: str) -> None:
+    plant = MujocoPlant(sensors=sensors, seed=42)
+    with trotting(plant) as go2:
+        for foot in FOOT_NAMES:
+            plant.fault("foot_force", part=foot)
+        start = plant.truth().q[0]
+        go2.wait(4.0)
+        assert plant.truth().q[0] - start > 0.9 * 0.5 * 4.0
+        assert go2.stand(), go2.last_outcome
+        assert go2.high_five(), go2.last_outcome
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "part", "told"), GRAVE)
+def test_a_robot_goes_limp_before_it_falls(kind: str, part: str, told: str) -> None:
+    plant = MujocoPlant(sensors="imu", seed=43)
+    with trotting(plant) as go2:
+        plant.fault(kind, part=part)
+        go2.wait(3.0)
+        assert go2.mode is Mode.DAMPED
+        assert told in go2.last_outcome.reason
+        assert plant.truth().tilt < 0.6
+        assert not go2.stand()
+        assert told in go2.last_outcome.reason
+
+
+@pytest.mark.slow
+def test_lost_packets_are_not_felt() -> None:
+    plant = MujocoPlant(sensors="imu", seed=44)
+    plant.fault("lost_packets", value=0.05)
+    with trotting(plant) as go2:
+        go2.wait(2.0)
+        assert go2.stand(), go2.last_outcome
+        assert go2.high_five(), go2.last_outcome
+        assert go2.health.is_sound
 
 
 @pytest.mark.slow
@@ -37,10 +93,7 @@ def test_what_breaks_of_a_trotting_robot_is_named_and_it_goes_on_or_limp(
 def test_a_gyro_that_jumps_as_feet_land_is_named_before_the_robot_leans(axis: str) -> None:
     # 13 of 48 were not: what jumps within 10 ms of a landing was taken for its jerk.
     plant = MujocoPlant(sensors="imu", seed=45)
-    with GO2Controller(plant=plant) as go2:
-        assert go2.walk()
-        go2.move(0.5)
-        go2.wait(1.5)
+    with trotting(plant) as go2:
         swung = plant.truth().feet_in_contact
         while not (plant.truth().feet_in_contact & ~swung).any():
             swung = plant.truth().feet_in_contact
