@@ -11,11 +11,17 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.compilation import subroutine
+from go2_wbc.contacts import TIE
+from go2_wbc.planning.gait_clock import foot_phase
 from go2_wbc.planning.ground import ground_at
+from go2_wbc.planning.swing import cubic
 from go2_wbc.planning.trunk import Trunk, gained, heading, world_velocity
 from go2_wbc.planning.walk import Planner, Walk
 from go2_wbc.robot.state import Snapshot
 
+LEAST_GAP = 0.06
+"""Distance [m] that the feet of one side, or of one end, keep from each other: a calf's width more
+than a foot's."""
 _TINY = 1e-9  #: Length [m] that stands in for zero where one divides by it
 
 
@@ -56,6 +62,26 @@ def speeding_up(trunk: Trunk, remaining: float, stance: float, fall: float) -> t
 
 
 @subroutine
+def way_by(trunk: Trunk, time: float) -> tuple[float, float]:
+    """How far [m] the ramp of the command carries the robot within a ``time`` [s], in the world."""
+    cosine, sine = np.cos(trunk.yaw), np.sin(trunk.yaw)
+    _, ahead = gained(trunk, 0, time)
+    _, left = gained(trunk, 1, time)
+    return cosine * ahead - sine * left, sine * ahead + cosine * left
+
+
+@subroutine
+def excess_velocity(now: Snapshot, s: Planner, c: Walk) -> tuple[float, float]:
+    """What the CoM has beyond the wanted velocity and the margin [m/s]."""
+    cosine, sine, v = np.cos(s.trunk.yaw), np.sin(s.trunk.yaw), s.trunk.velocity
+    x = now.v_world_com[0] - cosine * v[0] + sine * v[1]
+    y = now.v_world_com[1] - sine * v[0] - cosine * v[1]
+    speed = np.hypot(x, y)
+    share = max(0.0, 1.0 - c.config.stride_margin / max(speed, TIE))
+    return share * x, share * y
+
+
+@subroutine
 def foothold(
     leg: int,
     now: Snapshot,
@@ -72,7 +98,7 @@ def foothold(
     and ``w T / 2``: along their tangents the feet of a turn at 6 rad/s went 5 cm outside of them in
     mid-swing. In a curve a trunk of height ``h`` needs the force ``m w x v_ref``, whose moment
     about the CoM the feet balance that much farther outside. The last three terms together are
-    clipped to ``foothold_reach``.
+    clipped to ``foothold_reach``, as is where that leaves the foot at the end of its stance.
     """
     ref_x, ref_y = world_velocity(s.trunk)
     rate, gain = s.trunk.velocity[2], c.config.velocity_feedback
@@ -88,7 +114,50 @@ def foothold(
     y += gain * (v_y - ref_y) - lean * ref_x
     ahead_x, ahead_y = speeding_up(s.trunk, remaining, 2.0 * half, c.height / c.gravity)
     x, y = x + ahead_x, y + ahead_y
+    behind_x, behind_y = way_by(s.trunk, remaining + 2.0 * half)
+    end_x, end_y = x - 2.0 * half * v_x - behind_x, y - 2.0 * half * v_y - behind_y
+    share = min(1.0, c.config.foothold_reach / max(np.hypot(end_x, end_y), _TINY))
+    x, y = x - (1.0 - share) * end_x, y - (1.0 - share) * end_y
     share = min(1.0, c.config.foothold_reach / max(np.hypot(x, y), _TINY))
     goal[0] = now.q[0] + hip_x + x * share + v_x * remaining
     goal[1] = now.q[1] + hip_y + y * share + v_y * remaining
+    keep_apart(leg, now, s, c, remaining, goal)
     goal[2] = ground_at(s.ground, goal[0], goal[1]) + c.foot_radius
+
+
+@subroutine
+def keep_apart(
+    leg: int,
+    now: Snapshot,
+    s: Planner,
+    c: Walk,
+    remaining: float,
+    goal: Float[np.ndarray, "3"],
+) -> None:
+    """Move a touchdown point [m] so that the foot does not come down beyond its neighbour.
+
+    The neighbours are the other foot of its side, ahead or behind, and that of its end, aside. One
+    that still stands, or has just left, cannot swing through a leg that came down behind it: at
+    each turn from 2 m/s ahead to 2 back, and from 1 m/s left to 1 right, legs hit each other (0.5 %
+    of ticks; one run in 20 fell of it). While both are in the air each goes its share of a
+    stride; they are nearest in the middle of that time. A robot that is thrown must cross its legs.
+    """
+    stands, elapsed, _ = foot_phase(s.clock, leg)
+    if stands or excess_velocity(now, s, c) != (0.0, 0.0):
+        return
+    yaw = s.trunk.yaw + s.trunk.velocity[2] * remaining
+    cosine, sine, (v_x, v_y) = np.cos(yaw), np.sin(yaw), world_velocity(s.trunk)
+    for axis in range(2):
+        other = leg ^ (2 if axis == 0 else 1)
+        side = 1.0 if leg < other else -1.0
+        n_x, n_y = (side * cosine, side * sine) if axis == 0 else (-side * sine, side * cosine)
+        stands, since, left = foot_phase(s.clock, other)
+        if not stands and since > left:
+            continue
+        p = now.p_world_feet[other] if stands else s.feet[other].swing.start
+        both = remaining - left if stands else remaining + since
+        gone, _, _ = cubic(min(max(0.5 * both / (elapsed + remaining), 0.0), 0.5))
+        gap = LEAST_GAP - 2.0 * gone * abs(n_x * v_x + n_y * v_y) * s.clock.period
+        missing = max(gap - n_x * (goal[0] - p[0]) - n_y * (goal[1] - p[1]), 0.0)
+        goal[0] += missing * n_x
+        goal[1] += missing * n_y

@@ -19,7 +19,7 @@ from go2_wbc.algebra.active_set import SOLVED
 from go2_wbc.algebra.linear import cross, plus, solve_linear, triple
 from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
-from go2_wbc.planning.footholds import foothold, nominal_feet
+from go2_wbc.planning.footholds import excess_velocity, foothold, nominal_feet
 from go2_wbc.planning.gait_clock import Clock
 from go2_wbc.planning.ground import ground_at, haste, is_rough, on_leash, tilt
 from go2_wbc.planning.mpc import INTERVAL, NODES, STEP, Horizon, solve_mpc
@@ -137,17 +137,6 @@ def fill_contacts(clock: Clock, h: Horizon) -> None:
                 landings[k, leg] = 0.0
             else:
                 landings[k, leg] = stride - first
-
-
-@subroutine
-def excess_velocity(now: Snapshot, s: Planner, c: Walk) -> tuple[float, float]:
-    """What the CoM has beyond the wanted velocity and the margin [m/s]."""
-    cosine, sine, v = np.cos(s.trunk.yaw), np.sin(s.trunk.yaw), s.trunk.velocity
-    x = now.v_world_com[0] - cosine * v[0] + sine * v[1]
-    y = now.v_world_com[1] - sine * v[0] - cosine * v[1]
-    speed = np.hypot(x, y)
-    share = max(0.0, 1.0 - c.config.stride_margin / max(speed, TIE))
-    return share * x, share * y
 
 
 @subroutine

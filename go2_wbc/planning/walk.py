@@ -19,7 +19,7 @@ from go2_wbc.planning.mpc import Horizon, MpcConfig
 from go2_wbc.planning.sight import Sight
 from go2_wbc.planning.swing import FootContact, Step, Swing, SwingConfig
 from go2_wbc.planning.trunk import PoseConfig, Trunk
-from go2_wbc.records import Record
+from go2_wbc.records import Array4, Record
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Retired, past_table, ranged, retires
@@ -150,6 +150,7 @@ class Walk:
     p_base_hips: Float[np.ndarray, "4 3"]
     """Where the thighs' axes meet the legs' planes, in the base frame [m]."""
     link: float  #: length of a thigh, and of a calf [m]
+    knees: Array4  #: at which angle [rad] each leg is as straight as it gets
 
     @staticmethod
     def of(model: RobotModel, gait: Gait, config: LocomotionConfig) -> Walk:
@@ -166,6 +167,7 @@ class Walk:
             gait.stands_beside_com,
             np.array([leg.p_base_hip + [0.0, leg.width, 0.0] for leg in legs]),
             0.5 * (legs[0].thigh + legs[0].calf),
+            model.q_upper[2::3],
         )
 
 

@@ -8,8 +8,9 @@ import pytest
 
 from go2_wbc.contacts import GAITS, Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
+from go2_wbc.planning.footholds import LEAST_GAP
 from go2_wbc.planning.ground import GROUND_SHARE, MOST_FRICTION
-from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
+from go2_wbc.planning.locomotion import HURRY, LocomotionConfig, LocomotionPlanner
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.rotations import log_rotation, yaw_rotation
 from go2_wbc.robot.state import Snapshot
@@ -301,6 +302,51 @@ def test_a_foothold_stays_within_reach_of_the_hip() -> None:
     hips = start.p_world_feet[swing] + v * (TROT.swing_time - SWING_END)
     distance = np.linalg.norm((reference.p_world_feet[swing] - hips)[:, :2], axis=1)
     np.testing.assert_allclose(distance, CONFIG.foothold_reach, atol=5 * LAST_TICK)
+
+
+def test_a_foot_that_speeds_the_robot_up_is_within_reach_until_it_leaves() -> None:
+    """A robot that set out at 6 m/s^2 left its feet 0.3 m behind, where they bear nothing."""
+    start, config = resting(), replace(CONFIG, ground_friction=MOST_FRICTION)
+    planner = LocomotionPlanner(MODEL, TROT, config)
+    planner.start(start)
+    reference = hold(planner, start, VelocityCommand(3.0), SWING_END)
+    swing = ~reference.stance
+    ahead = (reference.p_world_feet - start.p_world_feet)[swing, 0]
+    gone = 0.5 * config.linear_acceleration * TROT.stance_time**2
+    np.testing.assert_allclose(ahead - gone, -config.foothold_reach, atol=0.01)
+
+
+@pytest.mark.parametrize("is_standing", [True, False])
+def test_the_gait_hurries_as_the_knee_of_a_standing_leg_gets_straight(is_standing: bool) -> None:
+    """Its foot bears nothing: trunks fell by 5 cm before the others came down."""
+    start, command = resting(), VelocityCommand(0.5)
+    planner = started(start)
+    reference = hold(planner, start, command, 0.1)
+    leg, before = np.flatnonzero(reference.stance == is_standing)[0], planner.phase
+    q = start.state.q.copy()
+    q[9 + 3 * leg] = MODEL.q_upper[2 + 3 * leg]
+    straight = start.replaced(state=replace(start.state, q=q, time=0.1 + TICK))
+    planner.update(straight, command)
+    faster = 1.0 + HURRY * is_standing
+    assert planner.phase - before == pytest.approx(faster * TICK / TROT.period)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("is_last", [False, True])
+def test_a_foot_comes_down_on_its_own_side_of_a_neighbour(axis: int, is_last: bool) -> None:
+    """Legs hit each other at each turn from 2 m/s ahead to 2 back, and fell over one another."""
+    start, neighbour = resting(yaw=0.8), 2 if axis == 0 else 1
+    swing = np.flatnonzero(~landing(start, VelocityCommand(1e-6)).stance)
+    leg = next(leg for leg in swing.tolist() if bool(leg & neighbour) == is_last)
+    way = yaw_rotation(0.8)[:, axis] * (-1.0 if is_last else 1.0)
+    feet = start.p_world_feet.copy()
+    feet[leg ^ neighbour] = feet[leg] - 0.02 * way
+    near = start.replaced(p_world_feet=feet)
+    apart = landing(near, VelocityCommand(1e-6)).p_world_feet[leg] - feet[leg ^ neighbour]
+    np.testing.assert_allclose(apart @ way, LEAST_GAP, atol=LAST_TICK)
+    thrown = [moving(at_start, -way) for at_start in (start, near)]
+    goals = [landing(at_start, VelocityCommand(1e-6)).p_world_feet[leg] for at_start in thrown]
+    np.testing.assert_allclose(*goals, atol=LAST_TICK, err_msg="the thrown may cross their legs")
 
 
 @pytest.mark.parametrize("seed", range(5))
