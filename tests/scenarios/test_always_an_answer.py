@@ -15,7 +15,7 @@ from go2_wbc.planning.locomotion import LocomotionConfig
 from go2_wbc.planning.mpc import MpcConfig
 from tests.unchecked import run_trials
 
-SAMPLES = [("boxes", 19), ("pushes", 17), ("stops", 8)]  #: Study and seed
+SAMPLES = [("boxes", 19), ("pushes", 17), ("stops", 11)]  #: Study and seed
 CONTRADICTORY = ("pushes", "stops")
 """Where the hard QP has no solution in some ticks; over boxes it had none until feet that stumble
 began another swing."""
@@ -36,7 +36,7 @@ def test_contradictions_are_answered_and_never_damp_an_upright_robot(
     assert values[f"{name}.grave"] <= GRAVE
 
 
-@pytest.mark.parametrize(("seed", "time"), [(20, 2.3), (21, 2.3), (31, 2.3)])
+@pytest.mark.parametrize(("seed", "time"), [(23, 2.3), (43, 2.3), (49, 2.3)])
 def test_a_hip_at_its_stop_for_a_moment_does_not_damp_a_robot_that_is_pushed(
     seed: int, time: float
 ) -> None:
@@ -52,6 +52,6 @@ def test_a_hip_at_its_stop_for_a_moment_does_not_damp_a_robot_that_is_pushed(
         robot.require(robot.go2.walk())
         robot.go2.move(0.5)
         robot.wait(time)
-        robot.push(heading_force(-math.pi / 2, 26.0), PUSH_TIME)
+        robot.push(heading_force(-math.pi / 2, 28.0), PUSH_TIME)
         robot.wait(2.0)
         assert robot.go2.telemetry.grave_ticks > 10
