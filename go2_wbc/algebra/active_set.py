@@ -229,7 +229,7 @@ def constrain(
     lower: Bounds,
     upper: Bounds,
     x: Vector,
-    y: Vector,
+    y: Float[np.ndarray, " told"],
 ) -> int:
     """The same as ``solve_qp``, from the minimum x without constraints, with H = L L'.
 
