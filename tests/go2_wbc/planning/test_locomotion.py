@@ -349,6 +349,23 @@ def test_a_foot_comes_down_on_its_own_side_of_a_neighbour(axis: int, is_last: bo
     np.testing.assert_allclose(goals[0], goals[1], atol=LAST_TICK, err_msg="the thrown may")
 
 
+@pytest.mark.parametrize("command", [VelocityCommand(3.4), VelocityCommand(0.0, 1.0)])
+def test_the_gap_of_the_feet_gives_way_to_a_fast_trot(command: VelocityCommand) -> None:
+    """Hind feet that were put back by it at each step: robots fell at 3.5 m/s, and one at 3."""
+    config = replace(CONFIG, ground_friction=MOST_FRICTION)
+    robot, planner = IdealRobot(), LocomotionPlanner(MODEL, GAITS["trot"], config)
+    planner.start(robot.snapshot)
+    landed, stood = np.full((4, 2), np.nan), np.ones(4, dtype=bool)
+    for _ in range(2000):
+        reference = planner.update(robot.snapshot, command)
+        came = reference.stance & ~stood
+        away = reference.p_world_feet[:, :2] - reference.body.p_world[:2]
+        landed[came] = (away - MODEL.p_base_feet_nominal[:, :2])[came]
+        stood = reference.stance
+        robot.follow(reference)
+    np.testing.assert_allclose(landed - landed.mean(axis=0), 0.0, atol=0.005)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_the_mirrored_robot_is_asked_for_the_mirror_image(seed: int) -> None:
     rng = np.random.default_rng(seed)
