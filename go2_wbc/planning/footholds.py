@@ -141,9 +141,9 @@ def keep_apart(
     that still stands, or has just left, cannot swing through a leg that came down behind it: at
     each turn from 2 m/s ahead to 2 back, and from 1 m/s left to 1 right, legs hit each other (0.5 %
     of ticks; one run in 20 fell of it). While both are in the air each goes its share of a
-    stride; they are nearest in the middle of that time. From 2.5 m/s on, and 0.8 aside, they are as
-    near as that in a steady trot, where the gap gives way. A robot that is thrown must cross its
-    legs.
+    stride; they are nearest in the middle of that time. From 2.5 m/s on those of a side
+    are as near as that in a steady trot, where the gap gives way. A robot that is thrown must cross
+    its legs.
     """
     stands, elapsed, _ = foot_phase(s.clock, leg)
     if stands or excess_velocity(now, s, c) != (0.0, 0.0):
@@ -161,9 +161,11 @@ def keep_apart(
         both = remaining - left if stands else remaining + since
         gone, _, _ = cubic(min(max(0.5 * both / (elapsed + remaining), 0.0), 0.5))
         speed = n_x * v_x + n_y * v_y
-        hips_x, hips_y = nominal[leg, 0] - nominal[other, 0], nominal[leg, 1] - nominal[other, 1]
-        steady = n_x * hips_x + n_y * hips_y + speed * (both + s.clock.duty * s.clock.period)
-        gap = min(LEAST_GAP - 2.0 * gone * abs(speed) * s.clock.period, steady - LEAST_GAP)
+        gap = LEAST_GAP - 2.0 * gone * abs(speed) * s.clock.period
+        if axis == 0:
+            hips_x, hips_y = nominal[leg] - nominal[other]
+            steady = n_x * hips_x + n_y * hips_y + speed * (both + s.clock.duty * s.clock.period)
+            gap = min(gap, steady - LEAST_GAP)
         missing = max(gap - n_x * (goal[0] - p[0]) - n_y * (goal[1] - p[1]), 0.0)
         goal[0] += missing * n_x
         goal[1] += missing * n_y

@@ -349,7 +349,7 @@ def test_a_foot_comes_down_on_its_own_side_of_a_neighbour(axis: int, is_last: bo
     np.testing.assert_allclose(goals[0], goals[1], atol=LAST_TICK, err_msg="the thrown may")
 
 
-@pytest.mark.parametrize("command", [VelocityCommand(3.4), VelocityCommand(0.0, 1.0)])
+@pytest.mark.parametrize("command", [VelocityCommand(3.4), VelocityCommand(-2.0)])
 def test_the_gap_of_the_feet_gives_way_to_a_fast_trot(command: VelocityCommand) -> None:
     """Hind feet that were put back by it at each step: robots fell at 3.5 m/s, and one at 3."""
     config = replace(CONFIG, ground_friction=MOST_FRICTION)
