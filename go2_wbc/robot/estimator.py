@@ -8,7 +8,7 @@ state, error, F and Q). The IMU drives it; per foot on the ground it is correcte
 
     place       f_i - p = R (p_i - r_imu)           (encoders through the leg's kinematics)
     velocity    v = w_i x (r n) - R u_i             (the same, differentiated)
-    height      f_i = r above level ground          (once, when the foot has come down)
+    height      f_i = r above a level that is known (once, when the foot has come down)
 
 and at rest (``rest_detection``) by
 
@@ -18,9 +18,9 @@ and at rest (``rest_detection``) by
 where u_i is the velocity of the foot's centre relative to the IMU. A foot is a sphere of radius r
 that rolls: its centre moves with w_i x (r n), w_i being the calf's angular velocity and n the
 upward normal. Taken for a fixed point, as in the papers, it would make a walking robot seem slower.
-Roll and pitch follow from gravity, seen through the velocity; heading is dead reckoning. Where
-feet come down beside level ground their heights are not taken in: on a slope of 15 deg that had
-turned the pitch by 7 deg within 8 s.
+Roll and pitch follow from gravity, seen through the velocity; heading is dead reckoning. Levels are
+those of the steps met last. Where feet come down between them their heights are not taken in: on a
+slope of 15 deg that had turned the pitch by 7 deg within 8 s.
 
 An error of the heading moves all places by the way walked since. Feet that stand tell of the
 heading, and by that lever had moved base and feet together by 6 cm/s: a robot that was to stand on
@@ -231,6 +231,8 @@ def estimate(
     learn_in_part(f, before, share_learnt)
     turn_world_about_robot(P)
     correct(f)
+    for leg in range(4):
+        s.feet[leg].met += f.error[2]
     for k in range(3):
         w[k] = reading.gyro[k] - x.gyro_bias[k]
     report(x, reading, w, c.p_base_imu, R, q, v)
@@ -377,7 +379,7 @@ class StateEstimator:
         P[:] = np.diag(variances)
         s = self._state
         s.rest.row[:], s.level.row[:] = 0.0, 0.0
-        s.level.height = x.p[2] - above
+        s.level.heights[:] = x.p[2] - above
         s.gyro[:], s.rest.joint_speeds[:] = reading.gyro, reading.v_joints
         for foot in s.feet:
             foot.age = 0.0

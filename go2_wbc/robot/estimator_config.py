@@ -26,11 +26,14 @@ class EstimatorConfig:
         place: of a foot's place by kinematics [m].
         velocity: of the velocity by one standing foot [m/s].
         velocity_share: the same, by which it grows with the foot's speed along the trunk.
-        height: of the ground where a foot comes down, against level ground [m].
-        uneven: distance [m] from level ground at which a foot comes down on something else. Heavy
-            legs sink by 20 mm into MuJoCo's floor as they land; taken for steps, that left the
-            height to feet which spring back, and it drifted by 0.1 m/s.
-        uneven_time: time [s] after which the ground counts as level again, where it is then.
+        height: of the ground where a foot comes down, against the level it stands on [m].
+        uneven: distance [m] from every level that is known at which a foot has come down on another
+            one. Heavy legs sink by 20 mm into MuJoCo's floor as they land; taken for steps, that
+            left the height to feet which spring back, and it drifted by 0.1 m/s.
+        terrace: distance [m] from a known level up to which a foot may stand on it. Between that
+            and ``uneven`` the ground is not in levels: no height is taken in for a while.
+        uneven_time: time [s] after which it counts as level again, where it is then. With 2 s the
+            height was left to feet that spring back for 1 m behind what is uneven: 2 cm.
         contact_force: force [N] above which a foot counts as touching: five deviations of its
             noise. A foot felt in the middle of its swing is taken for a stone: the trunk of a trot
             on the level went up and down by 20 mm.
@@ -77,8 +80,9 @@ class EstimatorConfig:
     velocity: float = 0.05
     velocity_share: float = 0.05
     height: float = 0.005
-    uneven: float = 0.03
-    uneven_time: float = 2.0
+    uneven: float = 0.04
+    terrace: float = 0.012
+    uneven_time: float = 1.0
     contact_force: float = 10.0
     trusted_force: float = 30.0
     rest: float = 0.3

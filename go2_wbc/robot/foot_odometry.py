@@ -6,17 +6,21 @@ and m_i the velocity that the IMU has if the foot rolls (innovation and h as in 
     place      s_i - (f_i - p) = df_i - dp - theta x s_i     r = place^2
     velocity   m_i - v = dv - theta x v                      r = k ((velocity / trust)^2 + slip^2
                                                                     + creep^2)
-    height     ground - f_i,z = df_i,z                       r = height^2, once after touchdown
+    height     level - g_i = df_i,z                          r = height^2, once after touchdown
 
 A turn of the estimate turns a leg's velocity with it, by theta x v. trust grows from 0 to 1 between
 ``contact_force`` and ``trusted_force``, slip decays after touchdown, creep grows with the foot's
 speed along the trunk, vertically ``vertical`` is added, and k is ``slip_factor``. A foot drifts by
-a speed of its own, which is its part of Q.
+a speed of its own, which is its part of Q. g_i is the height of the ground where the foot met it,
+before it sank in: known to 3 mm, be it on the level, on stairs or on blocks. The level is what is
+known of the ground there, see ``height_off``: shoes with an IMU know their height the same way
+(Park & Suh, *Height compensation using ground inclination estimation*, Sensors 11, 2011).
 """
 
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Float
 
 from go2_wbc.algebra.linear import put, turned
 from go2_wbc.compilation import subroutine
@@ -44,7 +48,8 @@ _LEVEL_SHARE = 0.2
 class Foot(Record):
     """A foot, as its leg measures it, along the world's axes."""
 
-    age: float  #: time [s] for which it has touched the ground; the rest is of this tick alone
+    age: float  #: time [s] for which it has touched the ground
+    met: float  #: height of the ground [m] where it came down; the rest is of this tick alone
     place: Array3  #: of its centre from the IMU [m]
     velocity: Array3  #: of the IMU if it rolls on the ground [m/s]
     rolling: Array3  #: velocity of its centre then [m/s]
@@ -55,10 +60,10 @@ class Foot(Record):
 
 
 class Level(Record):
-    """The ground, as far as it is level."""
+    """The ground, as far as it is level, in terraces."""
 
-    height: float  #: [m]
-    doubt_time: float  #: for which it is not believed [s]
+    heights: Float[np.ndarray, "8"]  #: of those met last [m], the last one first
+    doubt_time: float  #: for which they are not believed [s]
 
 
 @subroutine
@@ -117,14 +122,26 @@ def slip_factor(f: Filter, foot: Foot, gate: float) -> float:
 def height_off(level: Level, ground: float, variance: float, c: EstimatorConfig) -> float:
     """How far the ground is above ``ground`` [m], where a foot stands on it; inf if unknown.
 
-    ``variance``: of that difference. Once a foot has come down on something else, the ground is
-    not level: its height follows the feet, and says nothing of them for a while.
+    ``variance``: of that difference. What is more than ``uneven`` off every terrace is a terrace
+    that nobody knew. What is less off, yet no error, tells that the ground is not in terraces: they
+    follow the feet, and say nothing of them for a while.
     """
-    off = level.height - ground
-    if abs(off) > c.uneven or off * off > _HEIGHT_GATE * variance:
+    heights, place = level.heights, 0
+    for k in range(len(heights)):
+        if abs(heights[k] - ground) < abs(heights[place] - ground):
+            place = k
+    off = heights[place] - ground
+    is_known = abs(off) <= c.uneven
+    terrace = heights[place] if is_known else ground
+    for k in range(place if is_known else len(heights) - 1, 0, -1):
+        heights[k] = heights[k - 1]
+    heights[0] = terrace
+    if not is_known:
+        return np.inf
+    if abs(off) > c.terrace or off * off > _HEIGHT_GATE * variance:
         level.doubt_time = c.uneven_time
     if level.doubt_time > 0.0:
-        level.height -= _LEVEL_SHARE * off
+        heights[0] -= _LEVEL_SHARE * off
         return np.inf
     return off
 
@@ -185,16 +202,16 @@ def see_ground(
     level: Level,
     c: EstimatorConfig,
 ) -> None:
-    """Fill how far the ground is above the foot if it has just settled there; inf if unknown.
+    """Fill how far the ground is above where the foot has met it, once it has settled; else inf.
 
     ``age``: of its contact [s] before this tick; ``radius``: of the foot [m].
     """
-    settled = 3.0 * c.touchdown_time
     foot.height_off = np.inf
-    if age < settled <= foot.age:
-        ground = f.x.p_feet[leg, 2] - radius + c.compliance * force
+    if age < 0.0:
+        foot.met = f.x.p[2] + foot.place[2] - radius + c.compliance * force
+    if age < c.landing_time <= foot.age:
         z = FEET + 2 + 3 * leg
-        foot.height_off = height_off(level, ground, f.P[z, z] + c.height**2, c)
+        foot.height_off = height_off(level, foot.met, f.P[z, z] + c.height**2, c)
 
 
 @subroutine

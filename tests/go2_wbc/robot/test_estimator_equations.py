@@ -30,16 +30,19 @@ FORCES = {
     "all feet in the air": np.zeros(4),
     "all feet on the ground": np.array([40.0, 35.0, 60.0, 90.0]),
     "a foot on a stone": np.array([40.0, 35.0, 60.0, 90.0]),
+    "two feet on a step": np.array([40.0, 35.0, 60.0, 90.0]),
 }
-STONE = np.array([0.1, 0.0, 0.0])  # rad; of the hip of the foot that comes down second
+# rad; of the joints of the feet that come down second, or second and third
+LIFTED = {"stone": (np.array([0.1, 0.0, 0.0]), 1), "step": (np.array([0.0, 0.0, -0.35]), 2)}
 
 
 def readings(case: str) -> list[SensorReading]:
     """A robot that turns and kicks, with much noise; its feet come down one after the other."""
     rng, forces = np.random.default_rng(5), FORCES[case]
     lifted = np.zeros(12)
-    if "stone" in case:
-        lifted[3:6] = STONE
+    if (on := case.split()[-1]) in LIFTED:
+        by, count = LIFTED[on]
+        lifted[3 : 3 + 3 * count] = np.tile(by, count)
     return [
         SensorReading(
             time=STEP * tick,
@@ -70,7 +73,7 @@ class DocumentedFilter:
         biases = [CONFIG.gyro_bias] * 3 + [CONFIG.accelerometer_bias] * 3
         self.P = np.diag([0.001] * 3 + [0.1] * 3 + tilt + biases + [0.01] * 12) ** 2
         self.age, self.gyro, self.lying, self.upset = np.zeros(4), first.gyro, 0.0, 0.0
-        self.level, self.doubt = 0.0, 0.0
+        self.levels, self.met, self.doubt = [0.0] * 8, np.zeros(4), 0.0
         self.step(first, 0.0)
 
     @staticmethod
@@ -176,17 +179,15 @@ class DocumentedFilter:
                         factor * variance,
                     )
                 )
-            if self.age[leg] < 3 * c.touchdown_time <= self.age[leg] + dt:
-                z, height = slice(own.stop - 1, own.stop), np.full(1, c.height**2)
+            if self.age[leg] < 0.0:
                 pressed = self.model.foot_radius - c.compliance * reading.foot_forces[leg]
-                off = float(self.level + pressed - x[5][z][0])
+                self.met[leg] = x[0][2] + place[leg][2] - pressed
+            if self.age[leg] < c.landing_time <= self.age[leg] + dt:
+                z, height = slice(own.stop - 1, own.stop), np.full(1, c.height**2)
                 variance = P[15 + z.start, 15 + z.start] + height[0]
-                if abs(off) > c.uneven or off**2 > 9.0 * variance:
-                    self.doubt = c.uneven_time
-                if self.doubt > 0.0:
-                    self.level -= 0.2 * off
-                else:
-                    ground = self.level + pressed
+                off = self.off_level(self.met[leg], variance)
+                if off is not None:
+                    ground = x[5][z] + off
                     told.append((lambda y, z=z, ground=ground: y[5][z] - ground, height))
         felt = np.linalg.norm(reading.accelerometer - x[4])
         carried = 0.5 * self.model.gravity + 0.1 * w @ w
@@ -198,6 +199,20 @@ class DocumentedFilter:
             told.append((lambda y: y[1], np.full(3, c.rest**2)))
         self.age = self.age + dt
         self._correct(x, P, told)
+        self.met = self.met + self.x[0][2] - x[0][2]
+
+    def off_level(self, met: float, variance: float) -> float | None:
+        """How far the level on which a foot stands is above it, if that is known."""
+        level = min(self.levels, key=lambda level: abs(level - met))
+        off = level - met
+        if abs(off) > CONFIG.uneven:
+            self.levels = [met, *self.levels[:-1]]
+            return None
+        if abs(off) > CONFIG.terrace or off**2 > 9.0 * variance:
+            self.doubt = CONFIG.uneven_time
+        self.levels.remove(level)
+        self.levels = [level - 0.2 * off if self.doubt else level, *self.levels]
+        return None if self.doubt else off
 
     def _correct(
         self,

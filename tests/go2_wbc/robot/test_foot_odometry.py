@@ -185,18 +185,31 @@ def test_how_far_a_foot_is_believed(
     np.testing.assert_allclose(f.x.p_feet[leg], [0.002, 0.004, 0.0])
 
 
+LEVELS = np.array([0.05, 0.13, 0.21, 0.29, -0.05, -0.15, -0.25, -0.35])  # m
+
+
+@pytest.mark.parametrize("place", [0, 2, 7])
 @pytest.mark.parametrize(
     ("off", "doubt", "told"),
-    [(0.01, 0.0, True), (-0.01, 0.0, True), (0.01, 0.5, False), (0.031, 0.0, False)],
+    [(0.01, 0.0, True), (-0.01, 0.0, True), (0.01, 0.5, False), (0.013, 0.0, False)],
 )
-def test_the_ground_is_level_until_a_foot_comes_down_beside_it(
-    *, off: float, doubt: float, told: bool
+def test_a_foot_stands_on_a_level_that_is_known_or_the_ground_has_none(
+    *, place: int, off: float, doubt: float, told: bool
 ) -> None:
-    level = Level(height=0.05, doubt_time=doubt)
-    found = height_off(level, 0.05 - off, 1.0, C)
+    level, others = Level(heights=LEVELS, doubt_time=doubt), np.delete(LEVELS, place)
+    found = height_off(level, LEVELS[place] - off, 1.0, C)
     assert found == (pytest.approx(off) if told else np.inf)
-    assert level.height == pytest.approx(0.05 - (0.0 if told else 0.2 * off))
-    assert level.doubt_time == (C.uneven_time if abs(off) > C.uneven else doubt)
+    follows = LEVELS[place] - (0.0 if told else 0.2 * off)
+    assert level.heights == pytest.approx([follows, *others])  # as it was met last
+    assert level.doubt_time == (C.uneven_time if abs(off) > C.terrace else doubt)
+
+
+def test_a_step_is_a_level_that_nobody_knew_and_the_oldest_is_forgotten() -> None:
+    level = Level(heights=LEVELS)
+    assert height_off(level, 0.36, 1.0, C) == np.inf
+    assert level.heights == pytest.approx([0.36, *LEVELS[:-1]])
+    assert level.doubt_time == 0.0
+    assert height_off(level, 0.362, 1.0, C) == pytest.approx(-0.002)
 
 
 def test_a_height_that_is_too_sure_to_be_wrong_is_not_that_of_level_ground() -> None:
@@ -205,13 +218,18 @@ def test_a_height_that_is_too_sure_to_be_wrong_is_not_that_of_level_ground() -> 
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "looks"), [(2.9, 3.1, True), (2.7, 2.9, False), (3.0, 3.2, False)]
+    ("before", "after", "looks"), [(0.9, 1.1, True), (0.7, 0.9, False), (1.0, 1.2, False)]
 )
-def test_the_ground_is_looked_at_once_when_a_foot_has_settled(
+def test_the_ground_is_where_a_foot_met_it_once_that_has_settled(
     *, before: float, after: float, looks: bool
 ) -> None:
-    f, foot, level = unsure(), Foot(age=after * C.touchdown_time), Level(height=0.004)
-    f.x.p_feet[1, 2], force, radius = 0.024, 50.0, 0.022
-    see_ground(f, foot, 1, force, before * C.touchdown_time, radius, level, C)
+    """A foot sinks by up to 2 cm as it lands, and springs back for longer than 0.1 s."""
+    f, foot, level = unsure(), Foot(), Level(heights=np.full(8, 0.004))
+    f.x.p[2], force, radius = 0.3, 50.0, 0.022
+    foot.place[2], foot.age = -0.276, 0.002
+    see_ground(f, foot, 1, force, -0.002, radius, level, C)
     ground = 0.024 - radius + C.compliance * force
+    assert (foot.met, foot.height_off) == (pytest.approx(ground), np.inf)
+    foot.place[2], foot.age = -0.29, after * C.landing_time
+    see_ground(f, foot, 1, force, before * C.landing_time, radius, level, C)
     assert foot.height_off == (pytest.approx(0.004 - ground) if looks else np.inf)
