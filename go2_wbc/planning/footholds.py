@@ -22,6 +22,9 @@ from go2_wbc.robot.state import Snapshot
 LEAST_GAP = 0.06
 """Distance [m] that the feet of one side, or of one end, keep from each other: a calf's width more
 than a foot's."""
+FAST, NEARER = 2.5, 0.12
+"""Speed [m/s] from which on the gap gets smaller, and by how much [m] for each m/s: hind feet that
+were put back at each step brought robots down at 3.5 m/s, and one at 3."""
 _TINY = 1e-9  #: Length [m] that stands in for zero where one divides by it
 
 
@@ -82,6 +85,18 @@ def excess_velocity(now: Snapshot, s: Planner, c: Walk) -> tuple[float, float]:
 
 
 @subroutine
+def is_level(s: Planner) -> bool:
+    """Whether neither feet nor sight have found the ground rough: on stairs legs get straight."""
+    return not (s.clock.is_rough or s.clock.is_seen)
+
+
+@subroutine
+def goes_as_told(now: Snapshot, s: Planner, c: Walk) -> bool:
+    """Whether the robot, on level ground, has the commanded velocity: nothing has thrown it."""
+    return is_level(s) and excess_velocity(now, s, c) == (0.0, 0.0)
+
+
+@subroutine
 def foothold(
     leg: int,
     now: Snapshot,
@@ -98,7 +113,8 @@ def foothold(
     and ``w T / 2``: along their tangents the feet of a turn at 6 rad/s went 5 cm outside of them in
     mid-swing. In a curve a trunk of height ``h`` needs the force ``m w x v_ref``, whose moment
     about the CoM the feet balance that much farther outside. The last three terms together are
-    clipped to ``foothold_reach``, as is where that leaves the foot at the end of its stance.
+    clipped to ``foothold_reach``, as is, on level ground, where they leave the foot at the end of
+    its stance.
     """
     ref_x, ref_y = world_velocity(s.trunk)
     rate, gain = s.trunk.velocity[2], c.config.velocity_feedback
@@ -114,14 +130,15 @@ def foothold(
     y += gain * (v_y - ref_y) - lean * ref_x
     ahead_x, ahead_y = speeding_up(s.trunk, remaining, 2.0 * half, c.height / c.gravity)
     x, y = x + ahead_x, y + ahead_y
-    behind_x, behind_y = way_by(s.trunk, remaining + 2.0 * half)
-    end_x, end_y = x - 2.0 * half * v_x - behind_x, y - 2.0 * half * v_y - behind_y
-    share = min(1.0, c.config.foothold_reach / max(np.hypot(end_x, end_y), _TINY))
-    x, y = x - (1.0 - share) * end_x, y - (1.0 - share) * end_y
+    if is_level(s):
+        behind_x, behind_y = way_by(s.trunk, remaining + 2.0 * half)
+        end_x, end_y = x - 2.0 * half * v_x - behind_x, y - 2.0 * half * v_y - behind_y
+        share = min(1.0, c.config.foothold_reach / max(np.hypot(end_x, end_y), _TINY))
+        x, y = x - (1.0 - share) * end_x, y - (1.0 - share) * end_y
     share = min(1.0, c.config.foothold_reach / max(np.hypot(x, y), _TINY))
     goal[0] = now.q[0] + hip_x + x * share + v_x * remaining
     goal[1] = now.q[1] + hip_y + y * share + v_y * remaining
-    keep_apart(leg, now, s, c, nominal, remaining, goal)
+    keep_apart(leg, now, s, c, remaining, goal)
     goal[2] = ground_at(s.ground, goal[0], goal[1]) + c.foot_radius
 
 
@@ -131,7 +148,6 @@ def keep_apart(
     now: Snapshot,
     s: Planner,
     c: Walk,
-    nominal: Float[np.ndarray, "4 2"],
     remaining: float,
     goal: Float[np.ndarray, "3"],
 ) -> None:
@@ -141,12 +157,11 @@ def keep_apart(
     that still stands, or has just left, cannot swing through a leg that came down behind it: at
     each turn from 2 m/s ahead to 2 back, and from 1 m/s left to 1 right, legs hit each other (0.5 %
     of ticks; one run in 20 fell of it). While both are in the air each goes its share of a
-    stride; they are nearest in the middle of that time. From 2.5 m/s on those of a side
-    are as near as that in a steady trot, where the gap gives way. A robot that is thrown must cross
-    its legs.
+    stride; they are nearest in the middle of that time. From ``FAST`` on they come nearer than that
+    in a steady trot. A robot that is thrown must cross its legs.
     """
     stands, elapsed, _ = foot_phase(s.clock, leg)
-    if stands or excess_velocity(now, s, c) != (0.0, 0.0):
+    if stands or not goes_as_told(now, s, c):
         return
     yaw = s.trunk.yaw + s.trunk.velocity[2] * remaining
     cosine, sine, (v_x, v_y) = np.cos(yaw), np.sin(yaw), world_velocity(s.trunk)
@@ -160,12 +175,8 @@ def keep_apart(
         p = now.p_world_feet[other] if stands else s.feet[other].swing.start
         both = remaining - left if stands else remaining + since
         gone, _, _ = cubic(min(max(0.5 * both / (elapsed + remaining), 0.0), 0.5))
-        speed = n_x * v_x + n_y * v_y
-        gap = LEAST_GAP - 2.0 * gone * abs(speed) * s.clock.period
-        if axis == 0:
-            hips_x, hips_y = nominal[leg] - nominal[other]
-            steady = n_x * hips_x + n_y * hips_y + speed * (both + s.clock.duty * s.clock.period)
-            gap = min(gap, steady - LEAST_GAP)
+        speed = abs(n_x * v_x + n_y * v_y)
+        gap = LEAST_GAP - 2.0 * gone * speed * s.clock.period - NEARER * max(speed - FAST, 0.0)
         missing = max(gap - n_x * (goal[0] - p[0]) - n_y * (goal[1] - p[1]), 0.0)
         goal[0] += missing * n_x
         goal[1] += missing * n_y

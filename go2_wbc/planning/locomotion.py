@@ -21,7 +21,7 @@ from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.contacts import TIE, Gait
 from go2_wbc.errors import CommandError
 from go2_wbc.planning.command import VelocityCommand
-from go2_wbc.planning.footholds import excess_velocity, foothold, nominal_feet
+from go2_wbc.planning.footholds import foothold, goes_as_told, nominal_feet
 from go2_wbc.planning.force_mpc import apply_force_plan
 from go2_wbc.planning.gait_clock import adapt, foot_phase, restart
 from go2_wbc.planning.ground import (
@@ -121,7 +121,7 @@ def hurry(now: Snapshot, s: Planner, c: Walk) -> float:
     aside with 26 to 30 N s fell as they hurried, 5 as they did not.
     """
     most = 0.0
-    if excess_velocity(now, s, c) != (0.0, 0.0):
+    if not goes_as_told(now, s, c):
         return 0.0
     for leg in range(4):
         if s.feet[leg].contact.was_stance:

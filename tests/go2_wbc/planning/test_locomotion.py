@@ -316,18 +316,24 @@ def test_a_foot_that_speeds_the_robot_up_is_within_reach_until_it_leaves() -> No
     np.testing.assert_allclose(ahead - gone, -config.foothold_reach, atol=0.01)
 
 
-@pytest.mark.parametrize("is_standing", [True, False])
-def test_the_gait_hurries_as_the_knee_of_a_standing_leg_gets_straight(is_standing: bool) -> None:
-    """Its foot bears nothing: trunks fell by 5 cm before the others came down."""
+@pytest.mark.parametrize(("is_standing", "is_rough"), [(True, False), (False, False), (True, True)])
+def test_the_gait_hurries_as_the_knee_of_a_standing_leg_gets_straight(
+    is_standing: bool, is_rough: bool
+) -> None:
+    """Its foot bears nothing: trunks fell by 5 cm before the others came down. Not on stairs.
+
+    There 4 of 6 fell by sight, and 2 of 6 over blocks.
+    """
     start, command = resting(), VelocityCommand(0.5)
     planner = started(start)
     reference = hold(planner, start, command, 0.1)
     leg, before = np.flatnonzero(reference.stance == is_standing)[0], planner.phase
+    planner._state.clock.is_rough = is_rough
     q = start.state.q.copy()
     q[9 + 3 * leg] = MODEL.q_upper[2 + 3 * leg]
     straight = start.replaced(state=replace(start.state, q=q, time=0.1 + TICK))
     planner.update(straight, command)
-    faster = 1.0 + HURRY * is_standing
+    faster = 1.0 + HURRY * (is_standing and not is_rough)
     assert planner.phase - before == pytest.approx(faster * TICK / TROT.period)
 
 
