@@ -8,6 +8,7 @@ software a frame takes longer than all of the rest. Wants an idle machine.
 
 import tempfile
 import time
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -54,12 +55,14 @@ ROWS = {
     "plain": lambda seconds: (
         ("median", "pointer to page, median", "ms"),
         ("p95", "pointer to page, p95", f"<= {150 if seconds == LENGTHS[-1] else 120} ms"),
-        ("cpu", "server's processor time, mean", "<= 45 ms"),
+        ("cpu", "server's processor time, median", "<= 45 ms"),
+        ("cpu_p95", "server's processor time, p95", "<= 80 ms"),
     ),
     "steps": lambda _: (
         ("median", "pointer to page, median", "ms"),
         ("p95", "pointer to page, p95", "ms"),
-        ("cpu", "server's processor time, mean", "<= 60 ms"),
+        ("cpu", "server's processor time, median", "<= 60 ms"),
+        ("cpu_p95", "server's processor time, p95", "ms"),
     ),
 }
 
@@ -86,11 +89,10 @@ def drawn(seed: int, seconds: float, kind: str) -> str:
 
 
 def processor_time(process: int) -> float:
-    """What a process and its children have used [s], in steps of 0.01 s."""
-    stat = Path(f"/proc/{process}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+    """What a process and its children have used [s]."""
     children = Path(f"/proc/{process}/task/{process}/children").read_text(encoding="ascii")
-    used = (int(stat[11]) + int(stat[12])) / 100.0
-    return used + sum(processor_time(int(child)) for child in children.split())
+    clock = (~process << 3) | 2  # what clock_getcpuclockid(3) gives
+    return time.clock_gettime(clock) + sum(processor_time(int(one)) for one in children.split())
 
 
 def rest(process: int) -> None:
@@ -113,36 +115,36 @@ def measure(trial: Trial, found: TrialResult, seconds: int, kind: str) -> None:
             tab.evaluate("studio.tour.end()")
             tab.evaluate(WATCH)
             rest(opened.process_id)
-            before = processor_time(opened.process_id)
-            for _ in range(EDITS // EDITS_A_DRAG):
-                drag(tab, rng)
-            used = processor_time(opened.process_id) - before
+            used = partial(processor_time, opened.process_id)
+            times = np.array([drag(tab, rng, used) for _ in range(EDITS // EDITS_A_DRAG)])
             waits = np.array(tab.evaluate("waits"))
             found.notes["length"] = f"{tab.evaluate('replay.data.duration'):.1f} s"
             found.notes["edits"] = str(len(waits))
-    saves = EDITS // EDITS_A_DRAG  # each is one run more
     found.values["median"] = float(np.median(waits))
     found.values["p95"] = float(np.quantile(waits, 0.95))
-    found.values["cpu"] = 1000.0 * used / (len(waits) + saves)
+    found.values["cpu"] = 1000.0 * float(np.median(times))
+    found.values["cpu_p95"] = 1000.0 * float(np.quantile(times, 0.95))
 
 
-def drag(tab: Tab, rng: np.random.Generator) -> None:
-    """Drag the end of one bar to and fro, and leave it where it was."""
+def drag(tab: Tab, rng: np.random.Generator, used: Callable[[], float]) -> Sequence[float]:
+    """Drag the end of one bar to and fro, and leave it where it was; what is used for each edit."""
     edges = tab.page.locator(".bar:not(.foreign) em")
     edge = edges.nth(int(rng.integers(edges.count())))
     box = edge.bounding_box() or {}
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     tab.page.mouse.move(x, y)
     tab.page.mouse.down()
-    for offset in rng.integers(4, REACH, EDITS_A_DRAG - 1).tolist():
+    times = [used()]
+    for offset in (*rng.integers(4, REACH, EDITS_A_DRAG - 1).tolist(), 0):
         count = tab.evaluate("waits.length")
         tab.page.mouse.move(x + offset, y)
         tab.wait_for(
             f"(waits.length > {count} || studio.tools.say.className === 'bad') && {SETTLED}"
         )
-    tab.page.mouse.move(x, y)
+        times.append(used())
     tab.page.mouse.up()
     tab.wait_for(SETTLED)
+    return np.diff(times).tolist()
 
 
 WORDS = {"plain": "paws and trunk", "steps": "steps and trots, too"}

@@ -26,7 +26,7 @@ AFTERWARDS = "afterwards"  #: Label of what is shown of a run after its motion
 _AFTERWARDS = 1.0  #: How long [s] a run is shown after the end of its motion
 _TOGETHER = 0.05  #: Annotations on one limit that are this close in time [s] become one
 _LEAST_SAMPLES = 2
-_MOST_MARGINS = 3000  #: Samples of a margin curve
+_MOST_MARGINS = 1500  #: Samples of a margin curve: more than a chart has pixels
 _MOVED, _TURNED = 0.02, np.radians(2.0)
 """A motion that ends farther from its start, [m] and [rad], moves on."""
 
@@ -201,8 +201,12 @@ def _curve(series: Series) -> MarginCurve:
     step = -(-count // _MOST_MARGINS)
     rows = np.arange(0, count, step)
     if step > 1:
-        steps = np.append(least, np.full(-count % step, np.inf)).reshape(-1, step)
-        rows += np.ascontiguousarray(steps.T).argmin(axis=0)
+        best, *others = np.append(least, np.full(-count % step, np.inf)).reshape(-1, step).T
+        after = np.zeros(len(rows), dtype=int)
+        for row, other in enumerate(others, 1):  # half the time of argmin
+            is_less = other < best
+            after[is_less], best = row, np.minimum(best, other)
+        rows += after
     margin = least[rows]
     return MarginCurve(
         name=series.check,

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import final
 
-from controller.studio.orders import Order
+from controller.studio.orders import LONGEST_RUN, Order
 from go2_wbc.curves import Ease
+from go2_wbc.errors import StudioError
 from motions import Motion, Timeline
 from motions.authoring import Value
 from motions.language.keys import Key, OwnEase
@@ -50,7 +53,16 @@ class Maker:
         self._others = defaultdict[Path, set[str]](set)
 
     def make(self, order: Order) -> Made:
-        """Run the text; raises TimelineError if it is no motion, says the line."""
+        """Run the text.
+
+        Raises:
+            TimelineError: if it is no motion; says the line.
+            StudioError: if it takes longer than ``LONGEST_RUN``.
+        """
+        with _ended_after(LONGEST_RUN):
+            return self._noted(order)
+
+    def _noted(self, order: Order) -> Made:
         folder = str(order.path.parent)
         if folder not in sys.path:
             sys.path.insert(0, folder)
@@ -90,7 +102,7 @@ class Maker:
         A module that is from elsewhere stays so.
         """
         found, others, start = dict[str, int](), self._others[folder], f"{folder}{os.sep}"
-        for name in sys.modules.keys() - others:
+        for name in [name for name in sys.modules if name not in others]:
             file = getattr(sys.modules[name], "__file__", None) or ""
             if file.startswith(start) and not PACKAGES & {*(path := Path(file)).parts}:
                 found[name] = path.stat().st_mtime_ns if path.exists() else 0
@@ -105,3 +117,31 @@ def _moves(line: Timeline) -> list[Key]:
         replace(key, ease=Ease.LINEAR) if isinstance(key.ease, OwnEase) else key
         for key in line.keys
     ]
+
+
+class _Endless(BaseException):
+    """What no file catches."""
+
+
+@contextmanager
+def _ended_after(seconds: float) -> Iterator[None]:
+    """End what takes longer than this of processor time, where that can be: the process stays.
+
+    Raises:
+        StudioError: then.
+    """
+
+    def end(*_: object) -> None:
+        raise _Endless
+
+    if sys.platform == "win32":
+        yield
+        return
+    signal.signal(signal.SIGPROF, end)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    except _Endless:
+        raise StudioError(f"the file ran for longer than {seconds:g} s; it was stopped") from None
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)

@@ -147,14 +147,13 @@ class Studio:
         """Do what a page asks for.
 
         Args:
-            order: see ``edited_together``; besides ``op`` "undo" and "redo", "change" (see
-                ``mend``), "offers" (what there is to be done for a bar, by ``site`` and ``number``)
-                and "split" (it, at a ``time``), "show" (a motion that plays all others), and
-                "paste" behind ``site`` what ``copy`` has taken; "write_out" a ``bar``, by its
-                place, "read" the file that it is of. Of an order that is ``proposed`` what it would
-                change in the text is told. ``base`` is the state of the file
-                that the page knows, ``has`` the version of what it shows, ``commit`` whether to
-                save.
+            order: see ``edited_together``; besides ``op`` "undo" and "redo", "saved" (a draft is
+                given up), "change" (see ``mend``), "offers" (what there is to be done for a bar, by
+                ``site`` and ``number``) and "split" (it, at a ``time``), "show" (a motion that
+                plays all others), and "paste" behind ``site`` what ``copy`` has taken; "write_out"
+                a ``bar``, by its place, "read" the file that it is of. Of an order that is
+                ``proposed`` what it would change in the text is told. ``base`` is the state of the
+                file that the page knows, ``has`` the version that it shows, ``commit`` to save.
 
         Returns:
             What the page shows next, see ``PreviewServer.answer``; of what was saved the ``site``
@@ -166,6 +165,8 @@ class Studio:
                     self.show()
                 if order.get("op") not in HISTORY and order.get("base") != self._base:
                     raise StudioError("the file was saved elsewhere: this is what it says now")
+                if order.get("op") == "saved":
+                    return {}
                 if order.get("op") == "offers":
                     place = site_of(order.get("site")), run_of(self._with_callers(order))
                     source = Source(self._project.saved)

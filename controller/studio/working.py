@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import gc
 import math
-import signal
-import sys
 import threading
 import time
 from collections import Counter
@@ -20,7 +18,6 @@ from typing import TYPE_CHECKING, final
 from controller.studio.literals import Run
 from controller.studio.orders import (
     AT_ONCE,
-    LONGEST_RUN,
     Answer,
     Bar,
     Cut,
@@ -45,6 +42,7 @@ if TYPE_CHECKING:
 
 
 STOPPED = "stopped: the motion is as it was"
+RARELY = 100_000  #: New objects after which what is unused is looked for; an edit makes 3,000
 PERIOD = 0.1  #: s, between two words of how far it is
 
 
@@ -137,6 +135,7 @@ def serve(pipe: Connection, stop: Event) -> None:
                 if order.task is Task.EXPORT and isinstance(answer, Answer) and answer.content:
                     page_data.prepared(answer.content)  # no drag has to wait for what that loads
                     gc.freeze()  # nor each search for what is unused to go through it
+                    gc.set_threshold(RARELY)
             order = pipe.recv()
 
 
@@ -156,8 +155,7 @@ def _answer(
     if order.task is Task.PLAY:
         teller.tell(Doing("playing"))  # the check comes first
     try:
-        with _ended_after(LONGEST_RUN):
-            made = maker.make(order)
+        made = maker.make(order)
         motion, values, line = made.motion, made.values, made.line
         pipe.send("made")
         has_run = True
@@ -192,34 +190,6 @@ def _answer(
     shown = content if order.task is Task.EXPORT else prepared(content)
     is_solved = not is_unsolved(content)
     return Answer(motion.name, shown, bars, made.names, told, made.notes, is_solved=is_solved)
-
-
-class _Endless(BaseException):
-    """What no file catches."""
-
-
-@contextmanager
-def _ended_after(seconds: float) -> Iterator[None]:
-    """End what takes longer than this of processor time, where that can be: the process stays.
-
-    Raises:
-        StudioError: then.
-    """
-
-    def end(*_: object) -> None:
-        raise _Endless
-
-    if sys.platform == "win32":
-        yield
-        return
-    signal.signal(signal.SIGPROF, end)
-    signal.setitimer(signal.ITIMER_PROF, seconds)
-    try:
-        yield
-    except _Endless:
-        raise StudioError(f"the file ran for longer than {seconds:g} s; it was stopped") from None
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
 def _played(

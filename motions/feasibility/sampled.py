@@ -8,7 +8,6 @@ and what the controller does about its errors, go on for longer, and are not amo
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
@@ -66,12 +65,17 @@ class Change:
         count, ahead = len(numbers), _same(numbers, before)
         behind = _same(numbers[ahead:][::-1], before[ahead:][::-1])
         stands = asked.stance.all(axis=1) & (numbers[:, -1] == 0.0)
-        begins = [0, *np.flatnonzero(stands).tolist()]
-        ends = [*(np.flatnonzero(stands) + 1).tolist(), count]
-        first = begins[bisect_right(begins, max(ahead - BESIDE, 0)) - 1]
-        start = begins[bisect_right(begins, max(first - BESIDE, 0)) - 1]
-        last = ends[bisect_left(ends, min(count - behind + BESIDE, count))]
-        stop = ends[bisect_left(ends, min(last + BESIDE, count))]
+        stands[0] = stands[-1] = True
+        rows = np.flatnonzero(stands)
+
+        def ahead_of(row: int) -> int:
+            return int(rows[np.searchsorted(rows, max(row - BESIDE, 0), side="right") - 1])
+
+        def behind_of(row: int) -> int:
+            return int(rows[np.searchsorted(rows, min(row + BESIDE, count) - 1)]) + 1
+
+        first, last = ahead_of(ahead), behind_of(count - behind)
+        start, stop = ahead_of(first), behind_of(last)
         if not ahead or stop - start == count:
             return None
         return Change(start, first, last, stop, count - len(before), asked.times)

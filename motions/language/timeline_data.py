@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from itertools import pairwise
+from operator import attrgetter
 from typing import Self, TypeVar
 
 from go2_wbc.brief import inline_html
@@ -269,13 +270,16 @@ class TimelineData:
 
 
 _FIELDS = tuple(item.name for item in fields(TimelineData))
+_all_of = attrgetter(*_FIELDS)
+_SLOTS = tuple(vars(TimelineData)[name].__set__ for name in _FIELDS)
 
 
 def unchecked(timeline: _Some, **values: object) -> _Some:
     """A copy with other ``values``, of which it is known that they are valid."""
     other: _Some = object.__new__(type(timeline))
-    for name in _FIELDS:
-        value = values[name] if name in values else getattr(timeline, name)
+    for put, value in zip(_SLOTS, _all_of(timeline), strict=True):
+        put(other, value)
+    for name, value in values.items():
         object.__setattr__(other, name, value)
     return other
 

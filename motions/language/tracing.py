@@ -13,7 +13,7 @@ import sys
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from inspect import Parameter, signature
 from operator import is_
 from types import CodeType, FrameType
@@ -66,7 +66,8 @@ class CallMark(Mark):
 def separated(line: Timeline) -> tuple[Timeline, list[CallMark]]:
     """The timeline without the marks, and these by their starts."""
     keys = tuple(key for key in line.keys if not isinstance(key, CallMark))
-    return replace(line, keys=keys), line.in_order(CallMark)
+    latest = max((key.end for key in keys), default=0.0)
+    return unchecked(line, keys=keys, latest=latest), line.in_order(CallMark)
 
 
 class _Places:

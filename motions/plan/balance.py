@@ -46,6 +46,7 @@ from motions.batch_kinematics import (
 from motions.language.keys import BalanceShift
 from motions.language.timeline import Timeline
 from motions.language.timeline_data import SAME
+from motions.memory import Memory
 from motions.plan.compiled_plan import Problem
 from motions.plan.tracks import Instants, LegTracks, Move, Poses, Times
 
@@ -55,6 +56,7 @@ MARGINS = (0.08, 0.065, 0.05, 0.035, 0.02)
 The largest circle in the triangle of three feet, 0.387 m by 0.284 m, has a radius of 95 mm. The
 last is the check's limit (``FeasibilityLimits.support``) with 5 mm to spare. Own choice.
 """
+PLACES = 9  #: Decimals [m, rad] of what tells one pose to be balanced from another
 JOINT_MARGIN = 0.02
 """Distance [rad] that the joints keep from their limits in a balanced pose: own choice."""
 INSIDE = 0.03
@@ -83,10 +85,16 @@ class Balancer:
     """Finds the shifts of all raises of a timeline."""
 
     def __init__(
-        self, timeline: Timeline, tracks: LegTracks, model: RobotModel, times: Times, body: Poses
+        self,
+        timeline: Timeline,
+        tracks: LegTracks,
+        model: RobotModel,
+        times: Times,
+        body: Poses,
+        memory: Memory | None = None,
     ) -> None:
         """``body``: the path of the trunk at ``times``, without any shift."""
-        self._tracks, self._model = tracks, model
+        self._tracks, self._model, self._memory = tracks, model, memory
         self._times, self._body = times, body
         self._shifts, self._end = timeline.in_order(BalanceShift), timeline.end
         self._key_ends = sorted(key.end for key in timeline.keys)
@@ -128,7 +136,13 @@ class Balancer:
         instant = self._times[index : index + 1]
         now = Instants.of(instant, pose[None], self._tracks.footing.at(instant))
         joints = self._tracks.paths(now).q[0]
-        placed = self._solve(raised, pose, joints, now.ground.p_feet[0])
+        asked = raised, pose, joints, now.ground.p_feet[0]
+        if self._memory is None:
+            placed = self._solve(*asked)
+        else:
+            numbers = np.round(np.concatenate([one.ravel() for one in asked[1:]]), PLACES) + 0.0
+            known = "balance", raised, numbers.tobytes()
+            placed = self._memory.part(known, lambda: self._solve(*asked))
         return placed[:2] - self._body[index, :2]
 
     def _solve(

@@ -24,6 +24,7 @@ from motions.language.footing import Footing
 from motions.language.keys import BalanceShift, FootHold, LegKey, Mark, StepKey
 from motions.language.timeline import Timeline
 from motions.language.timeline_data import SAME, distinct
+from motions.memory import Memory
 from motions.plan.balance import Balancer, swayed
 from motions.plan.compiled_plan import CompiledPlan, Problem, event_at
 from motions.plan.tracks import (
@@ -47,7 +48,10 @@ LEAST_RAMP = 0.03  #: The same [s] where one foot lands as another lifts off
 
 
 def compile_quasi_static(
-    timeline: Timeline, model: RobotModel, p_feet: Float[np.ndarray, "4 3"] | None = None
+    timeline: Timeline,
+    model: RobotModel,
+    p_feet: Float[np.ndarray, "4 3"] | None = None,
+    memory: Memory | None = None,
 ) -> CompiledPlan:
     """The plan of ``timeline`` without dynamic blocks, in the frame of the motion.
 
@@ -59,6 +63,7 @@ def compile_quasi_static(
             runs in another thread.
         p_feet: where the feet's centres stand at first [m], by default below the hips; the trunk
             starts above them, with their heading.
+        memory: of the poses that balance; none by default.
 
     Raises:
         TimelineError: if it is empty, or a raised foot steps.
@@ -72,7 +77,7 @@ def compile_quasi_static(
     ground = footing.at(times)
     tracks = LegTracks(timeline, footing, model, home[timeline.entry])
     body = body_path(timeline, home, times, ground)
-    shifts, problems = Balancer(timeline, tracks, model, times, body).balance()
+    shifts, problems = Balancer(timeline, tracks, model, times, body, memory).balance()
     body[:, :2] += followed(times, np.zeros(2), shifts)
     feet = FootContacts(timeline)
     contacts = feet.schedule()

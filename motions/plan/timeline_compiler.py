@@ -194,7 +194,7 @@ def compile_timeline(
         memory = None  # what is near to a motion is found for all of it
     cuts = [] if memory is None else rests(timeline)
     if not blocks and mend is None and not cuts:
-        return compile_quasi_static(timeline, model, p_feet)
+        return compile_quasi_static(timeline, model, p_feet, memory)
     for block in blocks:
         _require_alone(timeline, block)
     maker = _Maker(timeline, model, p_feet, mend, progress)
@@ -443,12 +443,13 @@ class _Maker:
 
     def _compiled(self, stretch: _Stretch) -> CompiledPlan:
         feet, model = None if self._feet is self._home else self._feet, self._model
-        if self._memory is None:
+        memory = self._memory
+        if memory is None:
             return compile_quasi_static(stretch.of(self._timeline), model, feet)
         stretch = replace(stretch, length=round(stretch.length, DECIMALS))
         known = stretch, None if feet is None else tuple(np.round(feet, 9).ravel().tolist())
-        return self._memory.part(
-            known, lambda: compile_quasi_static(stretch.of(self._timeline), model, feet)
+        return memory.part(
+            known, lambda: compile_quasi_static(stretch.of(self._timeline), model, feet, memory)
         )
 
     def _move_on(

@@ -9,6 +9,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
 from motions import CheckedMotion, FeasibilityChecker, Timeline, deg
 from motions.memory import MOST_ROWS, Memory
+from motions.plan import balance
 from motions.plan.parts import rests
 from motions.plan.timeline_compiler import compile_timeline
 from motions.plan.trajectory import LEAST_SHARE, trajectory_of
@@ -201,3 +202,22 @@ def test_a_foot_bears_nothing_at_its_touchdown(model: RobotModel) -> None:
         share = trajectory_of(compile_timeline(line, model), model).load_share
         assert ((share == 0.0) | (share > LEAST_SHARE)).all()
         assert (share == 0.0).any()
+
+
+def test_a_pose_that_balances_is_found_once(
+    model: RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a part that is made longer the poses stay: each cost 1 ms of 50 of a drag's step."""
+    solved, solve = list[object](), balance.solve_pose
+
+    def counted(*given: object) -> object:
+        solved.append(given)
+        return solve(*given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(balance, "solve_pose", counted)
+    checker, counts = FeasibilityChecker(model, memory=Memory()), list[int]()
+    for over in (0.5, 0.6):
+        line = Timeline().foot("FR", z=0.06, over=over).down("FR", over=0.5).home(over=0.6)
+        checker.evaluate(line)
+        counts.append(len(solved))
+    assert counts[0] == counts[1] > 0

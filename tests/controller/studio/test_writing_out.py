@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from controller.studio import making
 from controller.studio.literals import Run
 from controller.studio.making import Made, Maker
 from controller.studio.orders import Order
@@ -151,3 +152,16 @@ def test_what_cannot_be_written_is_refused(tmp_path: Path) -> None:
     (repeat,) = (bar for bar, mark in enumerate(marks) if mark.call.name == "repeat")
     with pytest.raises(StudioError, match="outside of the motion's own function"):
         _out(tmp_path / "a.py", data, repeat)
+
+
+def test_a_text_that_is_tried_and_never_ends_is_left(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without the ``pop`` the loop goes on: the process hung until it was killed after 120 s."""
+    body = (
+        "    left, start = [0.5], Timeline()\n    while left:\n"
+        "        line = start.hold(left.pop())\n    return line\n"
+    )
+    monkeypatch.setattr(making, "LONGEST_RUN", 0.5)
+    after = _out(folder / "a.py", _file(body), 0)
+    assert "while" not in after.data.decode()

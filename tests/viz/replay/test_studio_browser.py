@@ -57,6 +57,38 @@ def test_an_edge_is_dragged(tab: Tab, file: Path) -> None:
     assert _bar(tab, 1)["x"] > right + 0.2 * second, "what follows comes later"
 
 
+@pytest.mark.parametrize(("index", "own"), [(0, ", over=0.734)"), (1, ".home(over=.60)")])
+def test_an_edge_that_is_dragged_back_leaves_the_text_as_it_was(
+    tab: Tab, file: Path, index: int, own: str
+) -> None:
+    """It was rounded to 0.05 s, and written anew: 0.734 came back as 0.75."""
+    first = file.read_text(encoding="utf-8")
+    text = first.replace(", over=0.6)", ", over=0.734)", 1)
+    text = text.replace(".home(over=0.6)", ".home(over=.60)", 1)
+    assert own in text
+    try:
+        file.write_text(text, encoding="utf-8")
+        tab.wait_for("Math.abs(studio.editor.bars[0].span[2] - 0.734) < 1e-6")
+        box, mouse = _bar(tab, index), tab.page.mouse
+        right, middle = box["x"] + box["width"] - 3, box["y"] + box["height"] / 2
+        mouse.move(right, middle)
+        mouse.down()
+        for offset in (25, 60, 8, 0):
+            mouse.move(right + offset, middle)
+        mouse.up()
+        tab.wait_for(f"{SETTLED} && {SAID} === 'saved'")
+        assert file.read_text(encoding="utf-8") == text
+        assert tab.evaluate("replay.data.duration") == pytest.approx(_length(tab))
+    finally:
+        file.write_text(first, encoding="utf-8")
+        tab.wait_for("Math.abs(studio.editor.bars[0].span[2] - 0.6) < 1e-6")
+
+
+def _length(tab: Tab) -> float:
+    """When the last bar ends that is saved [s]."""
+    return float(tab.evaluate("Math.max(...studio.editor.bars.map(({ span }) => span[2]))"))
+
+
 def test_a_number_is_typed_and_a_broken_limit_is_red(tab: Tab, file: Path) -> None:
     tab.page.locator("[data-bar='0']").click()
     field = tab.page.locator("[data-slot=pitch]")

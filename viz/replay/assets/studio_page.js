@@ -291,6 +291,8 @@ class Studio {
     const beat = this.beats.find((one) => Math.abs(one - end) < room);
     const nudge = this.timeUnit === "beats" ? BEAT_NUDGE : NUDGE;
     const exact = ratio(bar) * ((beat ?? end) - bar.span[1]);
+    const was = lengthOf(bar).value;
+    if (Math.abs(exact - was) < (beat === undefined ? nudge / 2 : 1e-6)) return { [lengthOf(bar).name]: was }; // back again
     const isOff = this.timeUnit === "s" && beat !== undefined; // the song's beats fit no step
     const value = Math.max(isOff ? Math.round(1000 * exact) / 1000 : rounded(exact, nudge), nudge);
     const isAccent = beat !== undefined && bar.name in ACCENTS && bar.more.includes("ease");

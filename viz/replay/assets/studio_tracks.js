@@ -251,7 +251,9 @@ class Tracks {
       this.mark.hidden = true;
       if (!was) return;
       this.isDragDone = true;
-      if (isEdge) this.studio.setMany(bar, values, true);
+      const { name, value } = lengthOf(bar) ?? {};
+      if (isEdge && values[name] === value) this.studio.send({ op: "saved" }, true); // not a digit differs
+      else if (isEdge) this.studio.setMany(bar, values, true);
       else if (goal !== null && goal !== this.studio.order().place) this.studio.move(goal);
       else this.draw();
     };
