@@ -37,6 +37,9 @@ class Template:
         return f".{self.call}({', '.join(texts)}){end}"
 
 
+REST = 0.1
+"""Time [s] that a foot stands before it is raised again: raised at once, it touches the ground with
+a newton or less, and one of five such touches is missed."""
 MOST_CALLERS = 20  #: Helpers that call each other
 PALETTE: Mapping[str, Template] = MappingProxyType(
     {
@@ -156,7 +159,11 @@ def _set(source: Source, site: Site, order: Mapping[str, object]) -> Source:
 
 
 def _insert(source: Source, site: Site, order: Mapping[str, object]) -> Source:
-    return source.insert(site, _template(order).code(source))
+    template = _template(order)
+    leg, given = template.arguments.get("leg"), source.slots(site)
+    is_down = source.text(site).startswith(".down(") and any(slot.value == leg for slot in given)
+    rest = f".hold({REST})" if template.call == "foot" and is_down else ""
+    return source.insert(site, rest + template.code(source))
 
 
 def _template(order: Mapping[str, object]) -> Template:

@@ -409,3 +409,13 @@ def test_twenty_moves_from_the_palette_make_no_long_line() -> None:
         data = edited(Source(data), {"op": "insert", "site": list(site), "title": title}).data
     assert max(map(len, data.splitlines())) <= LONGEST_LINE
     assert len(_sites(data)) > len(_sites(FILE)) + 20
+
+
+@pytest.mark.parametrize(("leg", "rest"), [("FR", ".hold(0.1)"), ("FL", "")])
+def test_a_foot_that_is_raised_again_stands_before(leg: str, rest: str) -> None:
+    lifted = b'.foot("FR", z=0.06, over=1).down("FR", over=1)'
+    data = FILE.replace(b".hold(0.4)", lifted)
+    order = {"op": "insert", "title": "Raise a foot", "values": {"leg": leg}}
+    after = edited(Source(data), {**order, "site": list(_site(data, "down"))}).data
+    raised = f'{rest}.foot("{leg}", z=0.08, over=0.5)'
+    assert after == data.replace(lifted, lifted + raised.encode())
