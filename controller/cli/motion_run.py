@@ -225,9 +225,9 @@ def getting_ready(
         starts = {Posture.STAND: go2.stand, Posture.SIT: go2.sit}
         if plan.entry not in starts:
             raise StanceMismatch(f"{plan.name} starts from {plan.entry.value}: cannot be run")
-        stands = go2.mode is Mode.LYING or go2.take_over()
-        if not (stands and starts[plan.entry]()) or truth.fall():
-            reason = truth.fall() or go2.last_outcome.reason
+        is_ready = (go2.mode is Mode.LYING or go2.take_over()) and starts[plan.entry]()
+        if not is_ready or truth.fall():
+            reason = truth.fall() if is_ready else go2.last_outcome.reason
             raise PlantError(f"the robot did not get ready: {reason}")
         yield go2, truth
 

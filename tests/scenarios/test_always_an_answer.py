@@ -36,7 +36,7 @@ def test_contradictions_are_answered_and_never_damp_an_upright_robot(
     assert values[f"{name}.grave"] <= GRAVE
 
 
-@pytest.mark.parametrize(("seed", "time"), [(23, 2.3), (43, 2.3), (49, 2.3)])
+@pytest.mark.parametrize(("seed", "time"), [(23, 2.3), (43, 2.3), (21, 2.3)])
 def test_a_hip_at_its_stop_for_a_moment_does_not_damp_a_robot_that_is_pushed(
     seed: int, time: float
 ) -> None:
