@@ -9,9 +9,11 @@ from typing import final
 from controller.studio.orders import Order, TooLong
 from controller.studio.plain import LOOKED_FOR, NO_WAY, UNSOLVED
 from go2_wbc.curves import Ease
+from go2_wbc.world import World
 from motions import CheckedMotion, FeasibilityChecker, Timeline
-from motions.dynamics.phases import Phase
+from motions.dynamics.phases import Phase, Progress
 from motions.language.keys import BodyKey, Key, PhaseKey
+from motions.memory import Memory
 from motions.plan.compiled_plan import CompiledPlan, Problem
 
 Phases = tuple[Phase, ...]
@@ -19,10 +21,24 @@ Phases = tuple[Phase, ...]
 
 @final
 class Jumps:
-    """Checks motions, and knows for which jumps no plan was found in time."""
+    """Checks motions, and knows for which jumps no plan was found in time.
 
-    def __init__(self, checker: FeasibilityChecker) -> None:
-        self._checker, self._given_up = checker, set[Phases]()
+    Attributes:
+        checker: with what it has worked out for the world that it is in.
+    """
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress, self._given_up = progress, set[Phases]()
+        self.checker = FeasibilityChecker(memory=Memory(), progress=progress)
+
+    def meet(self, world: World) -> None:
+        """Check in ``world`` from now on; nothing that was worked out in another holds there."""
+        felt = replace(world, sensors="ideal")  # the check has no equation for sensors
+        if felt != self.checker.world:
+            model = self.checker.model
+            self.checker = FeasibilityChecker(
+                model, world=felt, memory=Memory(), progress=self._progress
+            )
 
     def evaluate(self, line: Timeline, order: Order) -> CheckedMotion:
         """What the check says of it; of an order that is to be shown, without what was not found.
@@ -32,7 +48,7 @@ class Jumps:
         """
         blocks = line.in_order(PhaseKey)
         if not order.is_shown or not blocks:
-            return self._checker.evaluate(line)
+            return self.checker.evaluate(line)
         if order.is_afresh:
             self._given_up.clear()
         kept = set[Phases]()
@@ -40,11 +56,11 @@ class Jumps:
             if block.phases in self._given_up:
                 continue
             try:
-                self._checker.plan(_resting(line, {*kept, block.phases}), check=False)
+                self.checker.plan(_resting(line, {*kept, block.phases}), check=False)
                 kept.add(block.phases)
             except TooLong:
                 self._given_up.add(block.phases)
-        plan = self._checker.plan(_resting(line, kept), check=False)
+        plan = self.checker.plan(_resting(line, kept), check=False)
         if isinstance(plan, CompiledPlan):
             reason = LOOKED_FOR if order.is_looked_for else NO_WAY
             missing = tuple(
@@ -53,7 +69,7 @@ class Jumps:
                 if one.phases not in kept
             )
             plan = replace(plan, problems=(*plan.problems, *missing))
-        return self._checker.evaluate(plan)
+        return self.checker.evaluate(plan)
 
 
 def _resting(line: Timeline, kept: Collection[Phases]) -> Timeline:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from controller.studio.source import Slot
 from controller.studio.syntax import Site
+from go2_wbc.world import World
 from motions.authoring import Value
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ class Order:
     is_shown: bool = False  #: also without the jumps that were not found by then
     is_looked_for: bool = False  #: what was not found is looked for by another process meanwhile
     is_afresh: bool = False  #: what was not found before may have been found since
+    world: World = World()  #: it is checked and played in
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,12 +7,13 @@ import logging
 import secrets
 import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import final
 
 import viz
+from controller.studio import bars, worlds
 from controller.studio.edits import PALETTE, cut_of, edited, run_of, site_of
 from controller.studio.library import library
 from controller.studio.orders import AT_ONCE, Answer, Bar, Cut, Doing, Order, Task
@@ -23,12 +24,13 @@ from controller.studio.rewriting import offers
 from controller.studio.running import Runner
 from controller.studio.shows import with_show
 from controller.studio.songs import heard, songs_beside, sound_of
-from controller.studio.source import Slot, Source, parameters
+from controller.studio.source import Source
 from controller.studio.together import copied, edited_together, pasted
 from go2_wbc.curves import Ease
 from go2_wbc.errors import Go2WbcError, StudioError, unknown_name
 from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import Posture
+from go2_wbc.world import World
 from motions.authoring import Value
 from motions.language.body_and_feet import POSES
 from motions.language.steps import STEP_GAITS
@@ -80,7 +82,7 @@ class Studio:
         """
         self._project, self._values = Project(path), dict[str, Value]()
         self._lock, self.motion = threading.RLock(), motion
-        self._doing = dict[str, Doing]()
+        self._doing, self._world = dict[str, Doing](), World()
         self._runner, self._player = Runner(), Runner()
         self._is_solved = self._is_looking = True  # all that jumps in what is saved; for what does
         self._is_away = False  # the file, when it was looked at last
@@ -102,6 +104,7 @@ class Studio:
                     "/edit": self.edit,
                     "/copy": self.copy,
                     "/choose": self.choose,
+                    "/world": self.meet,
                     "/library": lambda _: library(),
                     "/music": self.music,
                     "/play": self.play,
@@ -202,7 +205,7 @@ class Studio:
             self._bars, self._is_solved, self.motion = shown.bars, shown.is_solved, shown.title
             self._server.publish(self._content(shown), shown.title)
             return site
-        editor = {"bars": [_picked(bar, _DRAFT) for bar in shown.bars]}
+        editor = {"bars": [bars.draft(bar) for bar in shown.bars]}
         content = replace(_shown(shown), editor=editor)
         return self._server.answer({}, content, shown.title, order.get("has"))
 
@@ -261,6 +264,19 @@ class Studio:
                 return {"error": str(error)}
         return {}
 
+    def meet(self, order: Mapping[str, object]) -> dict[str, object]:
+        """Check and play in another world from now on: ``friction``, ``payload``, ``sensors``."""
+        with self._lock:
+            before = self._world
+            try:
+                self._world = worlds.world_of(order)
+                shown = self._run(self._project.saved, longest=LONGEST_SOLVE)
+                self._server.publish(self._content(shown), shown.title)
+            except StudioError as error:
+                self._world = before
+                return {"error": str(error)}
+        return {}
+
     def music(self, order: Mapping[str, object]) -> dict[str, object]:
         """The beats and the sound of ``name``, one of the sound files beside the motion's."""
         path, name = self._project.path, order.get("name")
@@ -292,7 +308,7 @@ class Studio:
 
         It is looked for between that and what is saved, in the process that plays: edits go on.
         """
-        source, bars = Source(self._project.saved), self._bars
+        source, known = Source(self._project.saved), self._bars
         try:
             full = self._with_callers(order)
             site, run, asked = site_of(order.get("site")), run_of(full), order.get("value")
@@ -300,7 +316,7 @@ class Studio:
             low = found[0].value if found else 0.0
             if not isinstance(asked, int | float) or not isinstance(low, int | float):
                 raise StudioError("only of a number there is a most")
-            index = [(bar.site, bar.number) for bar in bars].index((site, run.number))
+            index = [(bar.site, bar.number) for bar in known].index((site, run.number))
             step, best, high = FINEST[bool(found) and found[0].is_angle], None, float(asked)
             while abs(high - low) > 1.5 * step:
                 middle = round(step * round(0.5 * (low + high) / step), 2)
@@ -315,8 +331,8 @@ class Studio:
 
     def _can_do(self, data: bytes, index: int) -> bool:
         """Whether the robot can do a call of a text, in as long as is tried."""
-        order = Order(self._project.path, data, self.motion, self._values, longest=LONGEST_TRY)
-        shown = self._player.run(order)
+        order = self._order(data, Task.CHECK, LONGEST_TRY)
+        shown = self._player.run(replace(order, is_shown=False))
         return shown.is_solved and index < len(shown.bars) and not shown.bars[index].broken
 
     def mend(self, _: Mapping[str, object]) -> dict[str, object]:
@@ -431,6 +447,7 @@ class Studio:
             longest=longest,
             is_shown=longest > 0.0 and (data == self._project.saved or not self._is_solved),
             is_looked_for=self._is_looking,
+            world=self._world,
         )
 
     def _told_of(self, which: str, doing: Doing | None) -> None:
@@ -450,9 +467,8 @@ class Studio:
         return order
 
     def _content(self, shown: Answer) -> ReplayContent | Prepared:
-        bars = [_bar(bar) for bar in shown.bars]
         editor = {
-            "bars": bars,
+            "bars": [bars.saved(bar) for bar in shown.bars],
             "file": self._project.path.name,
             "motion": shown.title,
             "motions": shown.motions,
@@ -462,6 +478,7 @@ class Studio:
             "palette": list(PALETTE),
             "songs": songs_beside(self._project.path),
             "notes": shown.notes,
+            "world": worlds.shown(self._world),
             "words": WORDS,
             "lanes": ["trunk", *(leg.name for leg in LEGS), "robot", "time"],
         }
@@ -480,20 +497,3 @@ def _whole(content: ReplayContent | Prepared) -> ReplayContent:
     if isinstance(content, Prepared):
         raise TypeError("only what a page needs")
     return content
-
-
-def _bar(bar: Bar) -> dict[str, object]:
-    """A bar as the page needs it, with the arguments that could be added by a name."""
-    given = {slot.of for slot in bar.slots}
-    more = [name for name in parameters(bar.name) if name not in {*given, "others"}]
-    slots = [_picked(slot, _SLOT) for slot in bar.slots]
-    return {**_picked(bar, _BAR), "slots": slots, "more": more}
-
-
-def _picked(one: Bar | Slot, names: Sequence[str]) -> dict[str, object]:
-    return {name: getattr(one, name) for name in names}
-
-
-_BAR = tuple(field.name for field in fields(Bar))
-_SLOT = tuple(field.name for field in fields(Slot) if field.name != "is_choice")
-_DRAFT = ("name", "number", "span", "parts", "broken", "values")  #: What a drag changes of a bar

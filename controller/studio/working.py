@@ -31,6 +31,7 @@ from controller.studio.source import Slot, Source
 from controller.studio.splitting import split
 from go2_wbc.errors import Go2WbcError, StudioError
 from go2_wbc.legs import LEGS, Leg
+from go2_wbc.world import World
 
 if TYPE_CHECKING:
     from controller.go2_controller import GO2Controller
@@ -117,20 +118,19 @@ def serve(pipe: Connection, stop: Event) -> None:
         order: Order | None = pipe.recv()
         from controller.studio.jumping import Jumps
         from controller.studio.making import Maker
-        from motions import FeasibilityChecker, Timeline
-        from motions.memory import Memory
+        from motions import Timeline
         from viz.replay import page_data  # takes its time, which no file has to answer for
 
         teller = Teller(pipe, stop)
-        checker = FeasibilityChecker(memory=Memory(), progress=teller)  # most of a motion stays
-        maker, jumps = Maker(), Jumps(checker)
+        maker, jumps = Maker(), Jumps(teller)
         if order is None:
-            _played(checker.evaluate(Timeline().body(z=-0.01, over=0.2)), checker, teller)
+            checked = jumps.checker.evaluate(Timeline().body(z=-0.01, over=0.2))
+            _played(checked, jumps.checker, World(), teller)
         pipe.send("loaded")
         while True:
             if order is not None:
                 teller.begin(order.longest)
-                answer = _answer(order, checker, jumps, maker, pipe, teller)
+                answer = _answer(order, jumps, maker, pipe, teller)
                 pipe.send(answer)
                 if order.task is Task.EXPORT and isinstance(answer, Answer) and answer.content:
                     page_data.prepared(answer.content)  # no drag has to wait for what that loads
@@ -140,12 +140,7 @@ def serve(pipe: Connection, stop: Event) -> None:
 
 
 def _answer(
-    order: Order,
-    checker: FeasibilityChecker,
-    jumps: Jumps,
-    maker: Maker,
-    pipe: Connection,
-    teller: Teller,
+    order: Order, jumps: Jumps, maker: Maker, pipe: Connection, teller: Teller
 ) -> Answer | StudioError:
     from controller.report_view import planned, slider
     from controller.studio.writing_out import written_out
@@ -160,8 +155,9 @@ def _answer(
         pipe.send("made")
         has_run = True
         source = Source(order.data)
+        jumps.meet(order.world)
         if order.task is Task.MEND:
-            found = suggest(line, checker=checker)
+            found = suggest(line, checker=jumps.checker)
             changes = tuple((item.call, item.meaning) for item in found)
             return Answer(motion.name, changes=changes)
         if isinstance(order.part, Cut):
@@ -172,7 +168,7 @@ def _answer(
             return Answer(motion.name, text=(after.data, None))
         checked = jumps.evaluate(line, order)
         if order.task is Task.PLAY:
-            content, told = _played(checked, checker, teller)
+            content, told = _played(checked, jumps.checker, order.world, teller)
         else:
             content, told = planned(checked), ""
     except (Go2WbcError, SystemExit) as error:
@@ -193,7 +189,7 @@ def _answer(
 
 
 def _played(
-    checked: CheckedMotion, checker: FeasibilityChecker, teller: Teller
+    checked: CheckedMotion, checker: FeasibilityChecker, world: World, teller: Teller
 ) -> tuple[ReplayContent, str]:
     """The motion in MuJoCo, in the world that it was checked for, and how that went."""
     from controller.go2_controller import GO2Controller
@@ -204,7 +200,7 @@ def _played(
     from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 
     with (
-        closing(GroundTruth(plant_in_world(checker.world))) as truth,
+        closing(GroundTruth(plant_in_world(world))) as truth,
         GO2Controller(plant=truth) as go2,
     ):
         is_ready = go2.sit() if checked.plan.entry is Posture.SIT else go2.stand()
@@ -215,7 +211,9 @@ def _played(
         content = performed(checked, go2.recording(), checker.model)
     why = result.fall or result.reason
     share = f"{100 * result.torque:.0f} % of the torque, {100 * result.speed:.0f} % of the speed"
-    return content, f"played in MuJoCo: done, {share}" if result.ok else f"NOT done: {why}"
+    where = "" if world == World() else f" ({world})"
+    done = f"played in MuJoCo{where}: done, {share}"
+    return content, done if result.ok else f"NOT done{where}: {why}"
 
 
 def _bars(

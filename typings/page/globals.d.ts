@@ -60,6 +60,14 @@ interface Editor {
   notes: string[];
   words: Record<string, string[]>;
   lanes: string[];
+  /** In which it is checked and played; see `controller.studio.worlds`. */
+  world: {
+    friction: number; payload: number; sensors: string;
+    told: string;
+    is_usual: boolean;
+    ranges: Record<string, [number, number]>;
+    choices: string[];
+  };
 }
 
 /** An edit that is asked for; see `controller.studio.edits`. */

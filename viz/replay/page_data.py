@@ -358,7 +358,9 @@ def _add_verdict(pack: Pack, verdict: Verdict) -> dict[str, object]:
 HTML_SUFFIXES = (".html", ".htm")
 PAGE_LIMIT = 4_000_000  #: Largest page [bytes]
 _SCRIPTS = "data stage scene ghost steps flags charts binding trust verdict sound app"
-_EDITOR = "words view tracks inspector proposals hands onion library music tools doing tour page"
+_EDITOR = (
+    "words view tracks inspector proposals hands onion library music world tools doing tour page"
+)
 """Of the assets, in the order in which they need one another; a live page has another one, and one
 that edits those of the studio."""
 

@@ -23,6 +23,7 @@ class Studio {
     this.tracks = new Tracks(this, this.view);
     this.music = new Music(this);
     this.doing = new Doing(this);
+    this.world = new World(this);
     this.tools = new Tools(this);
     this.inspector = new Inspector(this);
     this.proposals = new Proposals(this);
@@ -81,6 +82,7 @@ class Studio {
     this.doing.explain(editor, this.player.data.annotations);
     this.tracks.use(this.player.data, editor);
     this.music.use(editor);
+    this.world.use(editor);
     this.inspector.use(this.bar(), editor, this.timeUnit, this.chosen.size);
     this.hands.use();
   }
@@ -446,7 +448,7 @@ class Studio {
       "-": () => this.view.zoom(1 / ZOOM_STEP), 0: () => this.view.fit(), z: () => this.zoomToChosen(),
       t: () => this.music.tap(), i: () => this.tools.focus("Insert a move"), "?": () => this.tools.help(),
       e: () => this.inspector.focus(), l: () => this.focusBars(), k: () => this.split(),
-      h: () => this.onion.toggle(), a: () => this.library.open(),
+      h: () => this.onion.toggle(), a: () => this.library.open(), w: () => this.world.open(),
       ",": () => this.nudge(-1), ".": () => this.nudge(1),
     };
     const commanded = {

@@ -10,7 +10,7 @@ const KEYS = [
   ["I", "insert a move"], ["A", "play a motion of the library"], ["E", "to the numbers of the bar"], ["Esc", "as it is saved, nothing chosen"],
   ["+ −", "zoom the time; also wheel or two fingers"], ["0", "all of the time"], ["Z", "zoom to what is chosen"],
   ["H", "onion skins: the robot before and after"],
-  ["B", "play in physics"], ["T", "tap the tempo"], ["1 2 3 4", "view from the corner, side, front, above"],
+  ["B", "play in physics"], ["W", "the world that it is checked and played in"], ["T", "tap the tempo"], ["1 2 3 4", "view from the corner, side, front, above"],
   ["N", "to the next limit that is broken or tight"],
 ];
 
@@ -30,7 +30,7 @@ class Tools {
     this.fill(studio);
     this.notes = element("p", { id: "studio-notes" });
     this.show = this.button("do", "show", "Make a show", "Writes a motion that plays the others one after the other, in the order of the file");
-    this.box.append(this.tabs, this.show, this.say, studio.doing.line, this.robot, this.row, this.changes, studio.doing.why, this.notes);
+    this.box.append(this.tabs, this.show, this.say, studio.doing.line, this.robot, studio.world.box, this.row, this.changes, studio.doing.why, this.notes);
   }
 
   fill(studio) {

@@ -1,0 +1,30 @@
+"""Bars as the page needs them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+
+from controller.studio.orders import Bar
+from controller.studio.source import Slot, parameters
+
+_BAR = tuple(field.name for field in fields(Bar))
+_SLOT = tuple(field.name for field in fields(Slot) if field.name != "is_choice")
+_DRAFT = ("name", "number", "span", "parts", "broken", "values")  #: What a drag changes of a bar
+
+
+def saved(bar: Bar) -> dict[str, object]:
+    """All of a bar, with the arguments that could be added by a name."""
+    given = {slot.of for slot in bar.slots}
+    more = [name for name in parameters(bar.name) if name not in {*given, "others"}]
+    slots = [_picked(slot, _SLOT) for slot in bar.slots]
+    return {**_picked(bar, _BAR), "slots": slots, "more": more}
+
+
+def draft(bar: Bar) -> dict[str, object]:
+    """What a drag changes of it."""
+    return _picked(bar, _DRAFT)
+
+
+def _picked(one: Bar | Slot, names: Sequence[str]) -> dict[str, object]:
+    return {name: getattr(one, name) for name in names}

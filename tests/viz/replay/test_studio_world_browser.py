@@ -1,0 +1,54 @@
+"""The world that a motion is checked in is chosen on the page; the file is not touched."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.controller.studio.test_worlds import TURN
+from tests.viz.replay.browsing import Tab
+from tests.viz.replay.studio_tab import do
+
+pytestmark = pytest.mark.slow
+SAID = "document.getElementById('studio-say').textContent"
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("studio") / "turn.py"
+    path.write_text(TURN, encoding="utf-8")
+    return path
+
+
+def test_a_world_is_chosen_with_keys_and_stays_as_the_page_is_loaded_again(
+    tab: Tab, file: Path
+) -> None:
+    press, typed = tab.page.keyboard.press, tab.page.keyboard.type
+    tab.evaluate("studio.tour.box && studio.tour.end()")
+    assert tab.text("#world summary") == "World: friction 0.5"
+    assert tab.text("#badge").startswith("feasible")
+    press("w")
+    typed("0.2")
+    press("Tab")
+    tab.wait_for("document.querySelector('#world summary').textContent === 'World: friction 0.2'")
+    assert "broken" in tab.text("#badge")
+    assert tab.text("#chance p:last-child") == "friction 0.2"
+    assert "friction" in tab.text("#studio-why")
+    typed("40")
+    press("Enter")
+    tab.wait_for(f"{SAID}.startsWith('payload must be between 0 and 12')")
+    assert tab.evaluate("studio.world.fields.payload.value") == "0"
+    tab.page.get_by_label("Feels").select_option("its own sensors")
+    told = "World: friction 0.2, sensors imu"
+    tab.wait_for(f"document.querySelector('#world summary').textContent === '{told}'")
+    assert tab.evaluate(SAID) == ""
+    tab.page.reload()
+    tab.wait_for("window.studio && replay.version")
+    assert tab.text("#world summary") == told
+    tab.click("#world summary")
+    do(tab, "studio.world.usual.click()")
+    tab.wait_for("document.querySelector('#world summary').textContent === 'World: friction 0.5'")
+    assert tab.text("#badge").startswith("feasible")
+    assert tab.evaluate("studio.world.usual.disabled")
+    assert file.read_text(encoding="utf-8") == TURN
