@@ -85,10 +85,13 @@ def _open(tab: Tab, live: LivePreview) -> None:
 def test_everything_has_a_name_and_can_be_read(
     opened: tuple[LivePreview, Path], chromium_browser: Browser, is_dark: bool
 ) -> None:
-    states = ("studio.tools.told", "studio.tour.end()", "studio.select(0)", "studio.tools.help()")
+    states = (
+        *("studio.tools.told", "studio.tour.end()", "studio.select(0)", "studio.world.open()"),
+        "studio.tools.help()",
+    )
     with Tab(chromium_browser, is_dark=is_dark) as tab:
         _open(tab, opened[0])
-        for state in states:  # the tour, nothing chosen, a bar that breaks a limit, the keys
+        for state in states:  # the tour, nothing chosen, a limit broken, the world, the keys
             tab.evaluate(state)
             for width, height in SIZES:
                 tab.resize(width, height)
