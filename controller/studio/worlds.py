@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from go2_wbc.errors import ConfigError, StudioError
 from go2_wbc.world import RANGES, SENSORS, World
@@ -23,7 +24,8 @@ def world_of(order: Mapping[str, object]) -> World:
             raise StudioError(f"{name} must be a number, got {value!r:.40}")
         values[name] = value
     try:
-        return World(**values, sensors=str(order.get("sensors", World().sensors)))
+        world = World.of(values["friction"], values["payload"])
+        return replace(world, sensors=str(order.get("sensors", world.sensors)))
     except ConfigError as error:
         raise StudioError(str(error).replace("World.", "")) from error
 
