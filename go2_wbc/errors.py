@@ -207,6 +207,7 @@ EXTRAS: Mapping[str, str] = {
     "learning": "Gymnasium's environments, data sets",
     "mcap": "recordings as MCAP files, for Foxglove",
     "rerun": "recordings as rrd files, for Rerun (490 MB)",
+    "video": "films as MP4 files",
     "examples": "what some examples show their point with",
     "notebooks": "the notebooks: jupyter lab",
     "unitree": "Unitree's protocol: unitree-sim, unitree-drive",

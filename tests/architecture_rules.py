@@ -21,7 +21,7 @@ DISTRIBUTIONS = {"pinocchio": "pin", "PIL": "pillow", "collada": "pycollada"}
 
 OPTIONAL = frozenset(
     {"rclpy", "cyclonedds", "crocoddyl", "librosa", "soundfile", "ray", "pyarrow", "pandas"}
-    | {"gymnasium", "mcap", "onnx", "onnxruntime", "rerun"}
+    | {"gymnasium", "mcap", "onnx", "onnxruntime", "rerun", "av"}
 )
 """Libraries that are imported only by those who have them; contracts keep them apart."""
 

@@ -49,7 +49,7 @@ class Files:
     html: Annotated[Path | None, "FILE", "one offline page; ends in .html or .htm", page_file] = (
         None
     )
-    video: Annotated[Path | None, "FILE", "ends in .webp or .gif", video_file] = None
+    video: Annotated[Path | None, "FILE", "ends in .webp, .gif or .mp4", video_file] = None
     plot: Annotated[Path | None, "FILE", "the margins; ends in .svg, .png or .pdf", plot_file] = (
         None
     )

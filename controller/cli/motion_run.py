@@ -68,7 +68,9 @@ class Files:
     """What is written; None for what is not."""
 
     html: Annotated[Html, "write a 3D replay page, the plan as a ghost"] = None
-    video: Annotated[Path | None, "FILE", "an animation; ends in .webp or .gif", video_file] = None
+    video: Annotated[
+        Path | None, "FILE", "an animation; ends in .webp, .gif or .mp4", video_file
+    ] = None
     export: Annotated[
         Path | None,
         *("FILE", "the recording; .npz, .mcap for Foxglove or .rrd for Rerun"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import keyword
 import sys
 import textwrap
@@ -38,14 +37,11 @@ from controller.cli.motion_args import (
 )
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.files import checked_output, write_atomically
-from go2_wbc.legs import JOINT_NAMES, LEGS
 
 if TYPE_CHECKING:
-    from motions import CompiledPlan, FeasibilityReport, Motion, Suggestion, Timeline
-    from motions.plan.trajectory import Trajectory
+    from motions import FeasibilityReport, Motion, Suggestion
 
 WIDTH = 80
-ARRAYS = ("q", "v", "a", "rpy", "p_com", "stance")  #: What an npz file holds beside the time
 STARTER = '''"""{title}: a motion for the Go2.
 
     go2-wbc check {name}.py      can the robot do it?
@@ -275,63 +271,17 @@ def export(
         go2-wbc export wave --out wave.npz
         go2-wbc export wave --set times=5 --out five.json  then: go2-wbc run five.json
     """
-    from motions import save_motion
+    from controller.motion_files import write_motion
+    from motions import FeasibilityChecker
 
     found = the_motion(motion, set)
-    rows: dict[str, object] = {}
-    if out.suffix == SAVED_MOTION:
-        save_motion(found, out)
-    else:
-        with ProgressLine(is_quiet=json) as line:
-            line.update(0.0, f"compiling {found.name}")
-            rows = _write_compiled(found, out, line)
+    with ProgressLine(is_quiet=json or out.suffix == SAVED_MOTION) as line:
+        line.update(0.0, f"compiling {found.name}")
+        rows = write_motion(found, out, FeasibilityChecker(progress=line.solving))
     if json:
-        print_json({"motion": found.name, "file": str(out), **rows})
+        told = {} if rows is None else {"rows": rows}
+        print_json({"motion": found.name, "file": str(out), **told})
     else:
-        number = f": {rows['rows']} rows of" if rows else ":"
+        number = ":" if rows is None else f": {rows} rows of"
         print(f"wrote {shown_path(out)}{number} {found.name}")
     return ExitCode.OK
-
-
-def _write_compiled(
-    motion: Timeline | CompiledPlan, target: Path, line: ProgressLine
-) -> dict[str, object]:
-    """Write the plan or its trajectory; returns the number of rows of the latter."""
-    from motions import FeasibilityChecker, save_plan
-    from motions.plan.trajectory import trajectory_of
-
-    checker = FeasibilityChecker(progress=line.solving)
-    plan, model = checker.plan(motion, check=False), checker.model
-    if target.suffix == SAVED_PLAN:
-        save_plan(plan, target, model=model)
-        return {}
-    path = trajectory_of(plan, model)
-    if target.suffix == ".npz":
-        stream = io.BytesIO()
-        arrays: dict[str, Any] = {name: getattr(path, name) for name in ARRAYS}
-        np.savez_compressed(stream, time=path.times, **arrays)
-        content = stream.getvalue()
-    else:
-        content = _csv(path).encode()
-    write_atomically(target, content)
-    return {"rows": len(path.times)}
-
-
-def _csv(path: Trajectory) -> str:
-    joints = [name.removesuffix("_joint") for name in JOINT_NAMES]
-    header = ["time", "x", "y", "z", "roll", "pitch", "yaw", *joints]
-    header += [f"{joint}_speed" for joint in joints] + ["com_x", "com_y", "com_z"]
-    numbers, feet = ["%.6f"] * len(header), ["%d"] * len(LEGS)
-    header += [f"{leg.name}_stance" for leg in LEGS]
-    q, v = path.q, path.v
-    columns = [path.times, q[:, :3], path.rpy, q[:, 7:], v[:, 6:], path.p_com, path.stance]
-    stream = io.StringIO()
-    np.savetxt(
-        stream,
-        np.column_stack(columns),
-        fmt=[*numbers, *feet],
-        delimiter=",",
-        header=",".join(header),
-        comments="",
-    )
-    return stream.getvalue()

@@ -36,6 +36,7 @@ class Task(Enum):
     EXPORT = "export"  #: check, and have all of the content, not only what the page needs
     PLAY = "play"  #: in MuJoCo, beside the plan
     MEND = "mend"  #: look for changes that make it possible
+    WRITE = "write"  #: to a file: itself, its plan or its trajectory
     REWRITE = "rewrite"  #: make two calls of one, or write out what is computed
 
 
@@ -61,6 +62,7 @@ class Order:
     longest: float = 0.0  #: processor time [s] that one jump may be solved for; 0: the solver's own
     is_shown: bool = False  #: also without the jumps that were not found by then
     is_looked_for: bool = False  #: what was not found is looked for by another process meanwhile
+    out: Path | None = None  #: file that is written
     is_afresh: bool = False  #: what was not found before may have been found since
     world: World = World()  #: it is checked and played in
 

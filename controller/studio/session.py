@@ -12,8 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import final
 
-import viz
-from controller.studio import bars, worlds
+from controller.studio import bars, exports, worlds
 from controller.studio.edits import PALETTE, cut_of, edited, run_of, site_of
 from controller.studio.library import library
 from controller.studio.orders import AT_ONCE, Answer, Bar, Cut, Doing, Order, Task
@@ -23,7 +22,7 @@ from controller.studio.proposals import proposal, read
 from controller.studio.rewriting import offers
 from controller.studio.running import Runner
 from controller.studio.shows import with_show
-from controller.studio.songs import heard, songs_beside, sound_of
+from controller.studio.songs import heard, songs_beside
 from controller.studio.source import Source
 from controller.studio.together import copied, edited_together, pasted
 from go2_wbc.curves import Ease
@@ -46,7 +45,6 @@ LONGEST_SOLVE, LONGEST_TRY = 6.0, 3.0
 tried for the most that can be done: own choice. Of 17 jumps that the robot can do the slowest took
 2.3 s; none that took longer than 5 s passed the check."""
 FINEST = 0.01, 1.0  #: How near [m, deg] to the most that can be done it is looked for
-EXPORTS = ("html", "webp")  #: An offline page, and a film
 WORDS: Mapping[str, Sequence[str]] = {
     "leg": [leg.name for leg in LEGS],
     "ease": [ease.value for ease in Ease],
@@ -348,28 +346,28 @@ class Studio:
         """Write what is saved beside the file: ``kind`` is one of ``EXPORTS``.
 
         A page has the ``song`` that is named. A file that is there is written over only ``again``;
-        "exists" asks for that.
+        "exists" asks for that. A test that is there is kept.
         """
-        kind = order.get("kind")
-        if not isinstance(kind, str) or kind not in EXPORTS:
-            return {"error": unknown_name("kind", str(kind), EXPORTS)}
-        path = self._project.path.with_name(f"{self.motion}.{kind}")
-        if path.exists() and order.get("again") is not True:
+        kind, file, motion = order.get("kind"), self._project.path, self.motion or ""
+        if not isinstance(kind, str) or kind not in exports.EXPORTS:
+            return {"error": unknown_name("kind", str(kind), exports.EXPORTS)}
+        path, is_new = exports.beside(file, motion, kind), True
+        if kind != "test" and path.exists() and order.get("again") is not True:
             return {"exists": path.name}
         try:
-            shown = self._run(self._project.saved, Task.EXPORT)
-            content = replace(_whole(self._content(shown)), editor=None)
-            if kind == "html":
-                song = order.get("song")
-                if song in songs_beside(self._project.path):
-                    content = replace(content, sound=sound_of(path.with_name(str(song))))
-                viz.export_html(content, path, title=shown.title)
+            if kind == "test":
+                is_new = exports.write_test(path, file, motion)
+            elif kind in exports.PICTURES:
+                shown = self._run(self._project.saved, Task.EXPORT)
+                content = replace(_whole(self._content(shown)), editor=None)
+                exports.write_pictures(content, path, file, shown.title, order.get("song"))
             else:
-                viz.export_animation(content, path, speed=1.0, fps=12.5)
+                out = self._order(self._project.saved, Task.WRITE, 0.0)
+                self._player.run(replace(out, out=path))
         except Go2WbcError as error:
             return {"error": str(error)}
         self._server.files[path.name] = path
-        return {"told": f"wrote {path.name}", "file": path.name}
+        return exports.answer(path, kind, is_new=is_new)
 
     def look(self) -> bool:
         """Show what somebody else has saved, once it rests; whether anything is new."""
@@ -477,6 +475,7 @@ class Studio:
             "redo": self._project.can_redo,
             "palette": list(PALETTE),
             "songs": songs_beside(self._project.path),
+            "exports": exports.EXPORTS,
             "notes": shown.notes,
             "world": worlds.shown(self._world),
             "words": WORDS,

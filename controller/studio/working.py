@@ -142,6 +142,7 @@ def serve(pipe: Connection, stop: Event) -> None:
 def _answer(
     order: Order, jumps: Jumps, maker: Maker, pipe: Connection, teller: Teller
 ) -> Answer | StudioError:
+    from controller.motion_files import write_motion
     from controller.report_view import planned, slider
     from controller.studio.writing_out import written_out
     from motions import suggest
@@ -166,6 +167,9 @@ def _answer(
         if order.part is not None:
             after = written_out(source, maker, order, made)
             return Answer(motion.name, text=(after.data, None))
+        if order.out is not None:
+            write_motion(line, order.out, jumps.checker)
+            return Answer(motion.name)
         checked = jumps.evaluate(line, order)
         if order.task is Task.PLAY:
             content, told = _played(checked, jumps.checker, order.world, teller)

@@ -57,6 +57,7 @@ interface Editor {
   redo: boolean;
   palette: string[];
   songs: string[];
+  exports: Record<string, string>;
   notes: string[];
   words: Record<string, string[]>;
   lanes: string[];

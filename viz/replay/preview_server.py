@@ -32,6 +32,14 @@ LOOPBACK = "127.0.0.1"
 LOOPBACK_NAMES = (LOOPBACK, "localhost", "[::1]")
 _HEARTBEAT = 10.0
 """A page that hears nothing for so long [s] gets an empty line, which finds closed pages."""
+_KINDS = {
+    ".html": "text/html; charset=utf-8",
+    ".webp": "image/webp",
+    ".mp4": "video/mp4",
+    ".npz": "application/octet-stream",
+    ".plan": "application/octet-stream",
+}
+"""Of files that pages may open; others are texts."""
 _KEPT = 3  #: Versions that a page may have got last, of which it then gets the changes only
 _MOST_SENT = 65_536  #: Longest text [bytes] that a page may send
 TOKEN_HEADER = "X-Studio-Token"
@@ -302,8 +310,7 @@ class _Handler(BaseHTTPRequestHandler):
             content = file.read_bytes()
         except OSError as error:
             return self._refuse(f"{file.name}: {error.strerror}", HTTPStatus.NOT_FOUND)
-        kind = "text/html; charset=utf-8" if file.suffix == ".html" else f"image/{file.suffix[1:]}"
-        return self._answer_bytes(content, kind)
+        return self._answer_bytes(content, _KINDS.get(file.suffix, "text/plain; charset=utf-8"))
 
     def _answer(self, text: str, kind: str, status: HTTPStatus = HTTPStatus.OK) -> None:
         self._answer_bytes(text.encode(), f"{kind}; charset=utf-8", status)

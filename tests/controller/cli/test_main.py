@@ -156,7 +156,7 @@ def test_without_a_command_there_is_the_help_and_the_version_if_it_is_asked_for(
         ("identify-friction --mjcf my_go2.xml --interface lo", USAGE, "not both"),
         ("new 'two words'", USAGE, "must be a Python name"),
         ("preview bow --html bow.pdf", USAGE, "valid: .html, .htm"),
-        ("preview bow --video bow.mp4", USAGE, "valid: .webp, .gif"),
+        ("preview bow --video bow.avi", USAGE, "valid: .webp, .gif, .mp4"),
         ("preview bow --plot bow", USAGE, "no suffix; valid: .svg, .png"),
         ("preview bow --port http", USAGE, "must be a port from 0 to 65535, got 'http'"),
         ("preview bow --port 65536", USAGE, "must be a port from 0 to 65535"),

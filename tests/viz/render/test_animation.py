@@ -1,5 +1,6 @@
 """The animation file: as many frames, as long and as small as promised."""
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from PIL import Image
 
 import viz
-from go2_wbc.errors import ConfigError
+from go2_wbc.errors import ConfigError, MissingDependency
 from go2_wbc.recording import Recording
 from viz.render.pictures import SIZE_LIMIT, frame_times
 
@@ -102,3 +103,31 @@ def test_a_file_that_stays_too_large_is_refused(
     with pytest.raises(ConfigError, match="limit 500"):
         viz.export_animation(recording, tmp_path / "a.webp", speed=8.0, fps=4, size=(64, 40))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_mp4_has_the_promised_frames_and_size_and_moves(
+    recording: Recording, tmp_path: Path
+) -> None:
+    av = pytest.importorskip("av", reason='needs pip install "go2-wbc[video]"')
+    path = viz.export_animation(
+        recording, tmp_path / "demo.mp4", speed=2.0, fps=12.5, size=(241, 151)
+    )
+    with av.open(path) as film:
+        (track,) = film.streams.video
+        pictures = [frame.to_ndarray(format="rgb24").astype(float) for frame in film.decode(track)]
+        assert (track.codec.name, track.pix_fmt, track.average_rate) == ("h264", "yuv420p", 12.5)
+    assert len(pictures) == len(frame_times(recording, speed=2.0, fps=12.5))
+    assert {picture.shape for picture in pictures} == {(150, 240, 3)}
+    assert np.abs(pictures[10] - pictures[0]).mean() > 1.0
+
+
+def test_an_mp4_without_its_extra_is_refused_before_any_picture(
+    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "av", None)
+    monkeypatch.delitem(sys.modules, "viz.render.mp4_file", raising=False)
+    shares = list[float]()
+    with pytest.raises(MissingDependency, match=r"an MP4 needs PyAV .*go2-wbc\[video\]"):
+        viz.export_animation(recording, tmp_path / "demo.mp4", progress=shares.append)
+    assert not shares
+    assert not list(tmp_path.iterdir())

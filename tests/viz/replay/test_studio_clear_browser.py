@@ -143,6 +143,22 @@ def test_a_turn_is_one_bar_and_what_is_written_elsewhere_says_so(tab: Tab) -> No
     assert "It is part of Nod, which is written in another file" in tab.text("#inspector")
 
 
+def test_all_kinds_are_exported_from_one_list_by_keys(tab: Tab, file: Path) -> None:
+    exports = tab.page.get_by_role("combobox", name="Export")
+    words = tab.evaluate("Object.values(studio.player.data.header.editor.exports)")
+    assert exports.locator("option").all_inner_texts() == ["Export…", *words]
+    assert len({word[0] for word in words}) == len(words), "each by a key of its own"
+    exports.focus()
+    tab.page.keyboard.press("t")
+    tab.wait_for(f"{SAID} === 'wrote test_feet.py; next: pytest test_feet.py'")
+    assert "def test_the_robot_can_do_feet" in file.with_name("test_feet.py").read_text("utf-8")
+    exports.select_option("npz")
+    tab.wait_for(f"{SAID} === 'wrote feet.npz'")
+    answer = tab.page.request.get(tab.page.get_by_role("link").evaluate("(a) => a.href"))
+    assert answer.body() == file.with_name("feet.npz").read_bytes()
+    assert answer.headers["content-type"] == "application/octet-stream"
+
+
 def test_what_was_exported_is_a_link_to_it(tab: Tab, file: Path) -> None:
     do(tab, "studio.export('html')")
     tab.wait_for(f"{SAID} === 'wrote feet.html'")

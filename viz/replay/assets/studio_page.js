@@ -399,8 +399,10 @@ class Studio {
     }
     if (!answer.file) return this.tell(answer.error ?? "nothing was written", Boolean(answer.error));
     const link = element("a", { textContent: answer.file, href: `files/${encodeURIComponent(answer.file)}${location.search}`, target: "_blank" });
-    this.tell("wrote ");
-    this.tools.say.append(link);
+    const [before, after] = answer.told.split(answer.file);
+    this.tell(before);
+    this.tools.say.append(link, after);
+    if (answer.then) this.tools.say.append("; next: ", element("code", { textContent: answer.then }));
   }
 
   // Another motion of the file; what was copied can be pasted there.

@@ -34,7 +34,7 @@ class Tools {
   }
 
   fill(studio) {
-    const { palette } = studio.player.data.header.editor;
+    const { palette, exports } = studio.player.data.header.editor;
     this.row.append(
       this.group("History", this.button("op", "undo", "Undo", "Ctrl+Z"), this.button("op", "redo", "Redo", "Ctrl+Y")),
       this.group("Moves",
@@ -54,7 +54,7 @@ class Tools {
     this.robot = this.group("Robot",
       this.button("ask", "play", "Play in physics", "MuJoCo plays it beside the plan (B)"),
       this.button("ask", "mend", "Make it possible", "Looks for changes after which the robot can do it"),
-      this.list("Export", "Export…", "Writes a file beside the motion's", ["Offline page", "Film"], (kind) => studio.export(kind === "Film" ? "webp" : "html")),
+      this.list("Export", "Export…", "Writes a file beside the motion's", Object.entries(exports), (kind) => studio.export(kind)),
       this.icon("help", "?", "Keys, and the tour (?)"));
   }
 
@@ -89,11 +89,11 @@ class Tools {
     return button;
   }
 
-  // A list that acts at once, and then shows its title again.
+  // A list that acts at once, and then shows its title again; of words, or of what they mean and them.
   list(label, title, hint, words, act) {
     const list = element("select", { title: hint });
     list.setAttribute("aria-label", label);
-    list.append(new Option(title, ""), ...words.map((word) => new Option(word)));
+    list.append(new Option(title, ""), ...words.map((word) => (typeof word === "string" ? new Option(word) : new Option(word[1], word[0]))));
     list.addEventListener("change", () => {
       if (list.value) act(list.value);
       list.value = "";

@@ -1,0 +1,82 @@
+"""What the studio writes beside the file, and what is done with it then."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import viz
+from controller.studio.songs import songs_beside, sound_of
+from go2_wbc.files import checked_output, write_atomically
+from viz.content import ReplayContent
+
+EXPORTS: Final[Mapping[str, str]] = {
+    "html": "Offline page",
+    "webp": "Film (WebP)",
+    "mp4": "MP4 film",
+    "csv": "CSV trajectory",
+    "npz": "NumPy trajectory",
+    "json": "JSON motion",
+    "plan": "Plan",
+    "test": "Test for pytest",
+}
+"""What each kind is called on the page; its first letter is the key that chooses it in the list."""
+PICTURES: Final = ("html", "webp", "mp4")  #: Kinds that are made of what the page shows
+FPS: Final = {".webp": 12.5, ".mp4": 25.0}
+"""Pictures a second: a WebP of more is too large, or too coarse."""
+_THEN: Final = {"json": "go2-wbc run", "plan": "go2-wbc run", "test": "pytest"}
+_TEST: Final = '''"""Can the robot do ``{motion}``? Run: pytest test_{motion}.py"""
+
+from pathlib import Path
+
+from motions import load_file
+
+
+def test_the_robot_can_do_{motion}(check_motion):
+    """If not, this tells which limit is broken, when, and by how much."""
+    check_motion(load_file(Path(__file__).with_name({file!r}))[{motion!r}])
+'''
+
+
+def beside(file: Path, motion: str, kind: str) -> Path:
+    """Where an export of a motion lies."""
+    return file.with_name(f"test_{motion}.py" if kind == "test" else f"{motion}.{kind}")
+
+
+def answer(path: Path, kind: str, *, is_new: bool = True) -> dict[str, object]:
+    """What the page tells of a file, with the command ``then`` that takes it, if there is one."""
+    told = f"wrote {path.name}" if is_new else f"{path.name} is there already, and stays"
+    then = {"then": f"{_THEN[kind]} {path.name}"} if kind in _THEN else {}
+    return {"told": told, "file": path.name, **then}
+
+
+def write_test(path: Path, file: Path, motion: str) -> bool:
+    """Write a test of a motion of ``file``; whether it was not there, since others are kept.
+
+    Raises:
+        ConfigError: where it cannot be written.
+    """
+    if path.exists():
+        return False
+    text = _TEST.format(motion=motion, file=file.name)
+    write_atomically(checked_output(path, [".py"]), text.encode())
+    return True
+
+
+def write_pictures(
+    content: ReplayContent, path: Path, file: Path, title: str, song: object
+) -> None:
+    """Write an offline page, with the ``song`` that lies beside ``file``, or a film.
+
+    Raises:
+        ConfigError: where it cannot be written, or is too long for a WebP.
+        MissingDependency: for an MP4, without the extra.
+    """
+    if path.suffix == ".html":
+        if song in songs_beside(file):
+            content = replace(content, sound=sound_of(file.with_name(str(song))))
+        viz.export_html(content, path, title=title)
+    else:
+        viz.export_animation(content, path, speed=1.0, fps=FPS[path.suffix])
