@@ -8,7 +8,7 @@ state, error, F and Q). The IMU drives it; per foot on the ground it is correcte
 
     place       f_i - p = R (p_i - r_imu)           (encoders through the leg's kinematics)
     velocity    v = w_i x (r n) - R u_i             (the same, differentiated)
-    height      f_i = r above a level that is known (once, when the foot has come down)
+    height      f_i = r above ground that is known  (once, when the foot has come down)
 
 and at rest (``rest_detection``) by
 
@@ -19,8 +19,9 @@ where u_i is the velocity of the foot's centre relative to the IMU. A foot is a 
 that rolls: its centre moves with w_i x (r n), w_i being the calf's angular velocity and n the
 upward normal. Taken for a fixed point, as in the papers, it would make a walking robot seem slower.
 Roll and pitch follow from gravity, seen through the velocity; heading is dead reckoning. Levels are
-those of the steps met last. Where feet come down between them their heights are not taken in: on a
-slope of 15 deg that had turned the pitch by 7 deg within 8 s.
+those of the steps met last. Where feet come down between them, n and the height are those of a
+plane through the last prints: levels had turned the pitch by 7 deg within 8 s on 15 deg, and the
+upright n put the height 13 mm off per second on 20 deg.
 
 An error of the heading moves all places by the way walked since. Feet that stand tell of the
 heading, and by that lever had moved base and feet together by 6 cm/s: a robot that was to stand on
@@ -63,6 +64,7 @@ from go2_wbc.records import (
 )
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.foot_odometry import Foot, Level, follow_foot, see_foot, see_ground, take_in_leg
+from go2_wbc.robot.footprints import FAR
 from go2_wbc.robot.leg_kinematics import LegGeometry, Legs, foot_places, leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rest_detection import (
@@ -179,7 +181,8 @@ def follow_feet(
         joints = slice(3 * leg, 3 * leg + 3)
         pressed = c.foot_radius - 0.5 * told.compliance * force
         q, u = reading.q_joints[joints], reading.v_joints[joints]
-        see_foot(foot, c.legs.geometry[leg], q, u, c.p_base_imu, w, pressed, R)
+        creep = told.creep if foot.age <= told.settled_time else 0.0
+        see_foot(foot, c.legs.geometry[leg], q, u, c.p_base_imu, w, pressed, creep, R)
         age = follow_foot(f, foot, leg, force, dt, vertical, rests, told)
         see_ground(f, foot, leg, force, age, c.foot_radius, s.level, told)
         if foot.carries:
@@ -379,10 +382,10 @@ class StateEstimator:
         P[:] = np.diag(variances)
         s = self._state
         s.rest.row[:], s.level.row[:] = 0.0, 0.0
-        s.level.heights[:] = x.p[2] - above
+        s.level.heights[:], s.level.prints[:] = x.p[2] - above, FAR
         s.gyro[:], s.rest.joint_speeds[:] = reading.gyro, reading.v_joints
         for foot in s.feet:
-            foot.age = 0.0
+            foot.age, foot.normal[:] = 0.0, (0.0, 0.0, 1.0)
 
     def _feet(self, reading: SensorReading, R: Array3x3) -> Array4x3:
         """Places of the feet's centres [m] from the IMU, along the world's axes."""

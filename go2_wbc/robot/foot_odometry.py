@@ -7,6 +7,7 @@ and m_i the velocity that the IMU has if the foot rolls (innovation and h as in 
     velocity   m_i - v = dv - theta x v                      r = k ((velocity / trust)^2 + slip^2
                                                                     + creep^2)
     height     level - g_i = df_i,z                          r = height^2, once after touchdown
+    slope      plane - g_i = df_i,z                          r = (print^2 + d^2) (1 + leverage)
 
 A turn of the estimate turns a leg's velocity with it, by theta x v. trust grows from 0 to 1 between
 ``contact_force`` and ``trusted_force``, slip decays after touchdown, creep grows with the foot's
@@ -15,6 +16,12 @@ a speed of its own, which is its part of Q. g_i is the height of the ground wher
 before it sank in: known to 3 mm, be it on the level, on stairs or on blocks. The level is what is
 known of the ground there, see ``height_off``: shoes with an IMU know their height the same way
 (Park & Suh, *Height compensation using ground inclination estimation*, Sensors 11, 2011).
+
+Where the ground is in no levels, a plane is laid through where feet came down near by, off which
+these are by d (``footprints``). Its normal n is the one about which a foot rolls there, while it
+creeps downhill: its centre moves with w_i x (r n) + creep (n_z n - e_z). The height is taken from
+the prints of the other end's feet: they were made when the trunk was elsewhere, and a drift since
+shows. What moves the estimate along a plane does not show.
 """
 
 from __future__ import annotations
@@ -22,10 +29,11 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.algebra.linear import put, turned
+from go2_wbc.algebra.linear import cross, put, triple, turned
 from go2_wbc.compilation import subroutine
 from go2_wbc.records import Array3, Array3x3, Record
 from go2_wbc.robot.estimator_config import EstimatorConfig
+from go2_wbc.robot.footprints import EACH, plane_near
 from go2_wbc.robot.leg_kinematics import LegGeometry
 from go2_wbc.robot.state_filter import (
     FEET,
@@ -43,6 +51,11 @@ _HEIGHT_GATE = 9.0
 on something else, and its height says nothing."""
 _LEVEL_SHARE = 0.2
 """Share of a landing foot's height in that of the ground, while this is not believed."""
+_PRINT, _BETWEEN = 0.003, 1.0
+"""Deviation [m] of a print's height, and greatest leverage at which it tells of that of a foot:
+between the prints, not beyond them."""
+_BENT = 0.02
+"""Deviation [m] of prints from their plane at which half its slope is believed."""
 
 
 class Foot(Record):
@@ -54,16 +67,20 @@ class Foot(Record):
     velocity: Array3  #: of the IMU if it rolls on the ground [m/s]
     rolling: Array3  #: velocity of its centre then [m/s]
     speed: float  #: of it along the trunk [m/s]
+    normal: Array3  #: of the ground under it, upwards
     carries: bool  #: whether it counts as standing
     variance: Array3  #: of the velocity; 0 if it is not to be taken in
-    height_off: float  #: of the ground above it [m], where that is known to be level; else inf
+    height_off: float  #: of the ground above it [m], where that is known; else inf
+    height_variance: float  #: of that [m^2]
 
 
 class Level(Record):
-    """The ground, as far as it is level, in terraces."""
+    """The ground: in terraces, as far as it is level, or what the prints of the feet say."""
 
     heights: Float[np.ndarray, "8"]  #: of those met last [m], the last one first
     doubt_time: float  #: for which they are not believed [s]
+    prints: Float[np.ndarray, "16 3"]
+    """Where the front feet came down last [m], the last one first, and then the hind feet."""
 
 
 @subroutine
@@ -75,11 +92,13 @@ def see_foot(
     p_imu: Array3,
     w: Array3,
     radius: float,
+    creep: float,
     R: Array3x3,
 ) -> None:
     """Fill what a leg measures, along the world's axes.
 
-    q and u are the angles and speeds of its joints, w the angular velocity of the base.
+    q and u are the angles and speeds of its joints, w the angular velocity of the base, ``creep``
+    the speed downhill [m/s] of a foot, per sine of the slope.
     """
     c1, s1, c2, s2 = np.cos(q[0]), np.sin(q[0]), np.cos(q[1]), np.sin(q[1])
     c3, s3, bend = np.cos(q[1] + q[2]), np.sin(q[1] + q[2]), u[1] + u[2]
@@ -97,10 +116,14 @@ def see_foot(
     dz = (width * c1 + down * s1) * u[0] - longer * c1 + w[0] * y - w[1] * x
     put(turned(R, (x, y, z)), foot.place)
     put(turned(R, (-dx, -dy, -dz)), foot.velocity)
-    x, y, _ = turned(R, (w[0] + u[0], w[1] + c1 * bend, w[2] + s1 * bend))
-    put((radius * y, -radius * x, 0.0), foot.rolling)  # w x (0, 0, r)
-    foot.velocity[0] += foot.rolling[0]
-    foot.velocity[1] += foot.rolling[1]
+    n = foot.normal
+    put(
+        cross(turned(R, (w[0] + u[0], w[1] + c1 * bend, w[2] + s1 * bend)), triple(n)), foot.rolling
+    )
+    for k in range(3):
+        downhill = n[2] * n[k] - (1.0 if k == 2 else 0.0)
+        foot.rolling[k] = radius * foot.rolling[k] + creep * downhill
+        foot.velocity[k] += foot.rolling[k]
 
 
 @subroutine
@@ -192,6 +215,31 @@ def follow_foot(
 
 
 @subroutine
+def see_slope(foot: Foot, spot: Array3, variance: float, end: int, level: Level) -> None:
+    """Keep the print of a foot, and fill what prints say of the ground under it, if in no levels.
+
+    ``spot`` [m] is where the foot is, ``variance`` [m^2] that of its height; ``end`` is 0 in front.
+    """
+    prints, x, y, in_doubt = level.prints, spot[0], spot[1], level.doubt_time > 0.0
+    own, other = EACH * end, EACH * (1 - end)
+    if in_doubt:
+        height, _, _, bent, leverage = plane_near(prints, other, other + EACH, x, y)
+        off, unsure = height - foot.met, (_PRINT**2 + bent * bent) * (1.0 + leverage)
+        if leverage < _BETWEEN and off * off < _HEIGHT_GATE * (unsure + variance):
+            foot.height_off, foot.height_variance = off, unsure
+    for k in range(own + EACH - 1, own, -1):
+        prints[k] = prints[k - 1]
+    put((x, y, foot.met), prints[own])
+    sx, sy = 0.0, 0.0
+    if in_doubt:
+        _, sx, sy, bent, _ = plane_near(prints, 0, 2 * EACH, x, y)
+        share = 1.0 / (1.0 + (bent / _BENT) ** 4)
+        sx, sy = share * sx, share * sy
+    up = 1.0 / np.sqrt(1.0 + sx * sx + sy * sy)
+    put((-sx * up, -sy * up, up), foot.normal)
+
+
+@subroutine
 def see_ground(
     f: Filter,
     foot: Foot,
@@ -212,6 +260,8 @@ def see_ground(
     if age < c.landing_time <= foot.age:
         z = FEET + 2 + 3 * leg
         foot.height_off = height_off(level, foot.met, f.P[z, z] + c.height**2, c)
+        foot.height_variance = c.height**2
+        see_slope(foot, f.x.p_feet[leg], f.P[z, z], leg // 2, level)
 
 
 @subroutine
@@ -237,4 +287,4 @@ def take_in_leg(f: Filter, foot: Foot, leg: int, c: EstimatorConfig) -> None:
             off = m[k] - x.v[k]
             take_in(f, places[1:], shares[1:], 3, off, foot.variance[k])
     if foot.height_off != np.inf:
-        take_in_one(f, first + 2, foot.height_off, c.height**2)
+        take_in_one(f, first + 2, foot.height_off, foot.height_variance)

@@ -62,6 +62,7 @@ class DocumentedFilter:
 
     def __init__(self, model: RobotModel, first: SensorReading) -> None:
         self.model, self.pin, self.data = model, model.pin_model, model.pin_model.createData()
+        self.normals = np.tile([0.0, 0.0, 1.0], (4, 1))
         up = first.accelerometer
         roll, pitch = np.arctan2(up[1], up[2]), np.arctan2(-up[0], np.hypot(up[1], up[2]))
         R = pin.rpy.rpyToMatrix(roll, pitch, 0.0)
@@ -74,6 +75,7 @@ class DocumentedFilter:
         self.P = np.diag([0.001] * 3 + [0.1] * 3 + tilt + biases + [0.01] * 12) ** 2
         self.age, self.gyro, self.lying, self.upset = np.zeros(4), first.gyro, 0.0, 0.0
         self.levels, self.met, self.doubt = [0.0] * 8, np.zeros(4), 0.0
+        self.prints: list[list[np.ndarray]] = [[], []]  # of the front feet, of the hind feet
         self.step(first, 0.0)
 
     @staticmethod
@@ -116,7 +118,9 @@ class DocumentedFilter:
             u = pin.getFrameVelocity(self.pin, self.data, frame, pin.LOCAL_WORLD_ALIGNED)
             calf = R @ u.angular
             radius = self.model.foot_radius - 0.5 * CONFIG.compliance * reading.foot_forces[leg]
-            rolling[leg] = np.cross(calf, [0.0, 0.0, radius])
+            normal = self.normals[leg]
+            rolling[leg] = np.cross(calf, radius * normal)
+            rolling[leg] += CONFIG.creep * (normal[2] * normal - [0.0, 0.0, 1.0])
             own = u.linear - np.cross(w, place[leg])
             speed[leg] = np.hypot(own[0], own[1])
             velocity[leg] = rolling[leg] - R @ (u.linear - np.cross(w, P_BASE_IMU))
@@ -186,6 +190,7 @@ class DocumentedFilter:
                 z, height = slice(own.stop - 1, own.stop), np.full(1, c.height**2)
                 variance = P[15 + z.start, 15 + z.start] + height[0]
                 off = self.off_level(self.met[leg], variance)
+                height, off = self.seen_slope(leg, x[5][own], P[z, z][0, 0], height, off)
                 if off is not None:
                     ground = x[5][z] + off
                     told.append((lambda y, z=z, ground=ground: y[5][z] - ground, height))
@@ -213,6 +218,37 @@ class DocumentedFilter:
         self.levels.remove(level)
         self.levels = [level - 0.2 * off if self.doubt else level, *self.levels]
         return None if self.doubt else off
+
+    def seen_slope(
+        self, leg: int, spot: np.ndarray, variance: float, height: np.ndarray, off: float | None
+    ) -> tuple[np.ndarray, float | None]:
+        """Variance and distance of the ground above where a foot stands, if it is in no levels."""
+        end, met = leg // 2, self.met[leg]
+        if self.doubt:
+            plane, spread, lever = self.plane(self.prints[1 - end], spot)
+            unsure, above = (0.003**2 + spread**2) * (1.0 + lever), plane[0] - met
+            if lever < 1.0 and above**2 < 9.0 * (unsure + variance):
+                height, off = np.full(1, unsure), float(above)
+        self.prints[end] = [np.array([*spot[:2], met]), *self.prints[end][:7]]
+        slopes = np.zeros(2)
+        if self.doubt:
+            plane, spread, _ = self.plane(self.prints[0] + self.prints[1], spot)
+            slopes = plane[1:] / (1.0 + (spread / 0.02) ** 4)
+        self.normals[leg] = np.array([*-slopes, 1.0]) / np.sqrt(1.0 + slopes @ slopes)
+        return height, off
+
+    @staticmethod
+    def plane(prints: list[np.ndarray], spot: np.ndarray) -> tuple[np.ndarray, float, float]:
+        """Height and slopes at ``spot``, the prints' deviation, and the leverage."""
+        if not prints:
+            return np.zeros(3), 0.0, np.inf
+        off = np.array(prints) - [*spot[:2], 0.0]
+        w = np.exp(-0.5 * (off[:, :2] ** 2).sum(axis=1) / 0.2**2)
+        columns = np.column_stack([np.ones(len(off)), off[:, :2]])
+        A = np.linalg.inv(columns.T @ np.diag(w) @ columns + np.diag([0.0, 1e-4, 1e-4]))
+        plane = A @ columns.T @ (w * off[:, 2])
+        left = w @ off[:, 2] ** 2 - plane @ columns.T @ (w * off[:, 2])
+        return plane, float(np.sqrt(max(left, 0.0) / w.sum())), float(A[0, 0])
 
     def _correct(
         self,

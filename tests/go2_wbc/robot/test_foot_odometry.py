@@ -19,8 +19,11 @@ from go2_wbc.robot.foot_odometry import (
     Level,
     follow_foot,
     height_off,
+    see_foot,
     see_ground,
+    see_slope,
 )
+from go2_wbc.robot.footprints import EACH, FAR
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import IMU_FRAME, RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
@@ -233,3 +236,80 @@ def test_the_ground_is_where_a_foot_met_it_once_that_has_settled(
     foot.place[2], foot.age = -0.29, after * C.landing_time
     see_ground(f, foot, 1, force, before * C.landing_time, radius, level, C)
     assert foot.height_off == (pytest.approx(0.004 - ground) if looks else np.inf)
+
+
+TILT = np.radians(20.0)
+UPHILL = np.array([-np.sin(TILT), 0.0, np.cos(TILT)])
+
+
+def test_a_foot_rolls_about_the_normal_of_the_ground_and_creeps_downhill() -> None:
+    joints, w, R, radius, creep = (
+        np.array([0.1, 0.8, -1.6]),
+        np.array([0.2, 2.0, -0.3]),
+        np.eye(3),
+        0.02,
+        0.03,
+    )
+    leg, still, c1 = LegGeometry.of(MODEL, Leg.FL), np.zeros(3), np.cos(0.1)
+    rates = np.array([0.3, -0.4, 0.9])
+    foot, upright = Foot(normal=UPHILL), Foot(normal=[0.0, 0.0, 1.0])
+    see_foot(foot, leg, joints, rates, still, w, radius, creep, R)
+    see_foot(upright, leg, joints, rates, still, w, radius, creep, R)
+    turning = w + [rates[0], c1 * 0.5, np.sin(0.1) * 0.5]
+    downhill = creep * np.sin(TILT) * np.array([-np.cos(TILT), 0.0, -np.sin(TILT)])
+    rolling = np.cross(turning, radius * UPHILL) + downhill
+    np.testing.assert_allclose(foot.rolling, rolling, atol=1e-12)
+    np.testing.assert_allclose(upright.rolling, [0.02 * turning[1], -0.02 * turning[0], 0.0])
+    np.testing.assert_allclose(foot.velocity - upright.velocity, foot.rolling - upright.rolling)
+
+
+def on_a_slope(doubt: float, bend: float = 0.0) -> Level:
+    """Ground on which the front feet came down all over, the hind feet behind."""
+    rng, level = np.random.default_rng(4), Level(doubt_time=doubt)
+    x = rng.uniform(-0.3, 0.3, 2 * EACH) - np.repeat([0.0, 0.6], EACH)
+    level.prints[:, 0], level.prints[:, 1] = x, rng.uniform(-0.2, 0.2, 2 * EACH)
+    level.prints[:, 2] = np.tan(TILT) * x + bend * np.sign(rng.standard_normal(2 * EACH))
+    return level
+
+
+@pytest.mark.parametrize(
+    ("end", "doubt", "met", "told"),
+    [
+        (1, 1.0, 0.004, True),
+        (1, 0.0, 0.004, False),  # it is in levels
+        (0, 1.0, 0.004, False),  # no hind foot has come down there
+        (1, 1.0, 0.1, False),  # it stands on something
+    ],
+)
+def test_a_foot_on_a_slope_is_as_high_as_where_the_other_feet_came_down(
+    *, end: int, doubt: float, met: float, told: bool
+) -> None:
+    level, foot = on_a_slope(doubt), Foot(met=met, height_off=np.inf)
+    before = level.prints.copy()
+    see_slope(foot, np.array([0.0, 0.0, met]), 1e-6, end, level)
+    assert foot.height_off == (pytest.approx(-met, abs=1e-3) if told else np.inf)
+    if told:
+        assert 0.003**2 < foot.height_variance < 2.0 * 0.004**2
+    own = slice(EACH * end, EACH * (end + 1))
+    np.testing.assert_array_equal(level.prints[own][1:], before[own][:-1])
+    assert level.prints[own][0].tolist() == [0.0, 0.0, met]
+
+
+@pytest.mark.parametrize(
+    ("doubt", "bend", "least"), [(1.0, 0.0, 0.95), (1.0, 0.1, 0.0), (0.0, 0.0, 0.0)]
+)
+def test_the_normal_is_that_of_the_plane_as_far_as_there_is_one(
+    doubt: float, bend: float, least: float
+) -> None:
+    foot = Foot(met=0.0)
+    see_slope(foot, np.zeros(3), 1e-6, 1, on_a_slope(doubt, bend))
+    assert np.linalg.norm(foot.normal) == pytest.approx(1.0)
+    assert least <= foot.normal[0] / UPHILL[0] < least + 0.06
+
+
+def test_before_any_foot_has_come_down_nothing_is_known_of_a_slope() -> None:
+    foot, level = Foot(height_off=np.inf), Level(doubt_time=1.0)
+    level.prints[:] = FAR
+    see_slope(foot, np.zeros(3), 1e-6, 0, level)
+    assert foot.height_off == np.inf
+    assert foot.normal == pytest.approx([0.0, 0.0, 1.0])
