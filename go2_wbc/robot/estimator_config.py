@@ -69,7 +69,7 @@ class EstimatorConfig:
         landing_time: in which that decays by 1 / e [s].
         compliance: by which a foot's sphere is pressed flat [m/N]; it rolls on its middle.
         creep: speed [m/s] by which a walking robot's feet creep downhill, times the slope's sine:
-            7 mm/s on 20 deg, by MuJoCo's soft friction. Along a plane nothing else shows it.
+            9 mm/s on 20 deg, by MuJoCo's soft friction. Along a plane nothing else shows it.
         longest_step: time [s] between two readings after which the filter begins anew.
     """
 
@@ -111,7 +111,7 @@ class EstimatorConfig:
     landing: float = 5.0
     landing_time: float = 0.05
     compliance: float = 5e-5
-    creep: float = 0.02
+    creep: float = 0.025
     longest_step: float = 0.1
 
     __repr__ = brief

@@ -59,11 +59,12 @@ def test_a_curve_over_boxes_is_walked(
 
 
 @pytest.mark.slow
-def test_the_height_is_known_after_stairs(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("ground", "seed"), [("stairs", 2), ("ramp", 3), ("waves", 3)])
+def test_the_height_is_known_after(ground: str, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(locomotion, "FIRST_SEED", 0)
     found = TrialResult()
-    stairs = next(study for study in locomotion.ESTIMATED if study.name == "stairs-height")
-    stairs.measure(Trial(2, sensors=IMU), found)
+    studies = {study.name: study for study in locomotion.ESTIMATED}
+    studies[f"{ground}-height"].measure(Trial(seed, sensors=IMU), found)
     assert found.values["height"] < HEIGHT_BAR
     assert found.values["velocity"] < VELOCITY_BAR
 
