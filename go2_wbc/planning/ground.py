@@ -301,10 +301,17 @@ def haste(g: Ground, friction: float, delay: float, velocity: Array3) -> float:
 
 
 @subroutine
+def is_met_rough(g: Ground, now: Snapshot) -> bool:
+    """Whether feet have just found it rough, at the speed at which the robot goes."""
+    speed = np.hypot(now.v_world_com[0], now.v_world_com[1])
+    return g.roughness > ROUGH * max(speed / ROUGH_PACE, 1.0)
+
+
+@subroutine
 def carry_ground(g: Ground, c: RoughConfig, now: Snapshot, dt: float) -> None:
     """Follow the CoM, after ``dt`` seconds."""
     speed = np.hypot(now.v_world_com[0], now.v_world_com[1])
-    is_met = g.roughness > ROUGH * max(speed / ROUGH_PACE, 1.0)
+    is_met = is_met_rough(g, now)
     way = c.way if g.roughness > c.high else FIRST_WAY if is_met and not is_rough(g) else 0.0
     steep = min(max(np.hypot(g.slope[0], g.slope[1]) / STEEP - 1.0, 0.0), 1.0)
     come = speed * dt * (1.0 + (STEEP_FORGETS - 1.0) * steep)

@@ -62,6 +62,7 @@ from go2_wbc.planning.swing import (
     Swing,
     begin_swing,
     follow_contact,
+    lead_beyond,
     loaded_time,
     resume_swing,
     swing_foot,
@@ -209,7 +210,7 @@ def note_liftoffs(
         note_stumble(s.ground)
     for leg in range(4):
         if stumbles[leg]:
-            resume_swing(s.feet[leg].swing, now.p_world_feet[leg], s.ground, progress[leg])
+            resume_swing(s.feet[leg].swing, leg, now, s.ground, progress[leg])
 
 
 @subroutine
@@ -238,6 +239,7 @@ def fill_feet(
             share = min(loaded / max(config.mpc.load_ramp, TIE), 1.0)
         else:
             foothold(leg, now, s, c, nominal, remaining[leg], goal)
+            lead_beyond(foot.swing, world_velocity(s.trunk), s.ground, goal)
             progress = elapsed[leg] / (elapsed[leg] + remaining[leg])
             p, v, a = target.p_world_feet[leg], target.v_world_feet[leg], target.a_world_feet[leg]
             if foot.step.is_sighted or (steps_by_sight(s.sight) and elapsed[leg] < dt):

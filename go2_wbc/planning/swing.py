@@ -11,7 +11,8 @@ How high a foot is raised, and how late it goes ahead, is settled when it leaves
 learnt of the ground meanwhile is for the next swing: a curve that was changed on the way jumped by
 5 cm, and feet that swung beside the one that had stumbled came down too early, too far back. A foot
 that is stopped in the middle of its swing begins another one where it is, in the time that is left:
-it rises along what it has met before it goes on.
+it rises along what it has met before it goes on, and comes down well beyond: at the edge of a step,
+where it was led before, it slipped off, the trunk dropped, and its nose met the face of the next.
 
 Those feet of a gait stand that shall, and those that have found a step before they do. A foot that
 meets something above the ground, late in its swing, stands from then on. If it went on towards its
@@ -35,13 +36,25 @@ import numpy as np
 from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
 from go2_wbc.planning.gait_clock import Clock
-from go2_wbc.planning.ground import Ground, RoughConfig, apex_raise, delay, is_rough
+from go2_wbc.planning.ground import (
+    Ground,
+    RoughConfig,
+    apex_raise,
+    delay,
+    is_met_rough,
+    is_rough,
+)
 from go2_wbc.records import Array3, Record
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
 EARLIEST = 0.7  #: Share of the swing from which on a contact may be a landing
 STEP = 0.015
 """Height [m] above the ground from which on it is one. Both are from a search in simulation."""
+
+BEYOND, ABOVE = 0.08, 0.08
+"""How far [m] a foot that was stopped on rough ground is put down beyond that place at least, and
+by how much higher [m] than on smooth ground a whole swing of it would be."""
 
 
 class FootContact(Record):
@@ -116,6 +129,7 @@ class Swing(Record):
     raised: float  #: height [m] by which its apex is higher than on smooth ground
     delay: float  #: share of it in which the foot only rises
     begun: float  #: share of the gait's swing that had passed by then
+    beyond: float  #: how far [m] ahead of its start it ends at least; 0 for wherever it is led
     peak: float
     """Share of it at which the foot is highest; 0 until that is settled, at its first tick."""
 
@@ -138,20 +152,35 @@ def begin_swing(swing: Swing, p_foot: Array3, ground: Ground, c: RoughConfig) ->
     """A foot leaves the ground."""
     swing.start[:] = p_foot
     swing.raised, swing.delay, swing.begun = apex_raise(ground, c), delay(ground), 0.0
+    swing.beyond = 0.0
     swing.peak = 0.0 if is_rough(ground) else 0.5
 
 
 @subroutine
-def resume_swing(swing: Swing, p_foot: Array3, ground: Ground, progress: float) -> None:
+def resume_swing(swing: Swing, leg: int, now: Snapshot, ground: Ground, progress: float) -> None:
     """A foot has been stopped at ``progress``; it goes on from there, once in a swing.
 
-    It is raised as high as the time allows that is left, and not higher for the ground: to lift it
-    by 7 cm within 44 ms took 590 N from the standing feet.
+    It is raised as high as the time allows that is left: to lift one by 7 cm more within 44 ms took
+    590 N from the standing feet.
     """
     if swing.begun == 0.0:
-        swing.start[:] = p_foot
-        swing.raised, swing.delay, swing.begun = 0.0, delay(ground), progress
+        is_step = is_rough(ground) or is_met_rough(ground, now)
+        swing.start[:] = now.p_world_feet[leg]
+        swing.raised, swing.beyond = (ABOVE, BEYOND) if is_step else (0.0, 0.0)
+        swing.delay, swing.begun = delay(ground), progress
         swing.peak = 0.5
+
+
+@subroutine
+def lead_beyond(swing: Swing, velocity: tuple[float, float], ground: Ground, goal: Array3) -> None:
+    """Move a goal [m] ahead, on the robot's way at ``velocity`` [m/s], as far as a swing asks."""
+    speed = max(np.hypot(velocity[0], velocity[1]), TIE)
+    x, y = velocity[0] / speed, velocity[1] / speed
+    way = (goal[0] - swing.start[0]) * x + (goal[1] - swing.start[1]) * y
+    missing = max(swing.beyond - way, 0.0) if swing.beyond > 0.0 else 0.0
+    goal[0] += missing * x
+    goal[1] += missing * y
+    goal[2] += missing * (ground.slope[0] * x + ground.slope[1] * y)
 
 
 @subroutine
