@@ -14,6 +14,8 @@ from go2_wbc.robot.imu_watch import (
     CALM,
     JUMP_LASTS,
     LONG_CALM,
+    LONGEST_JUMP,
+    SEEN_AFTER,
     SHAKEN,
     SHAKEN_LASTS,
     WatchedImu,
@@ -411,14 +413,16 @@ def test_speeds_and_gyro_are_read_through_their_noise(noise: float) -> None:
     assert told == pytest.approx(0.8 if noise == 1.0 else 0.0, rel=0.2)
 
 
-def named_after(landing: float) -> float:
-    """Time [s] from a jump of the gyro that feet show, until it is named, with a landing then."""
+def named_after(landing: float, seen_after: float = 0.0) -> float:
+    """Time [s] from a jump of the gyro until it is named: feet show it, and a landing is then."""
     imu = WatchedImu(stood=CALM)
     for k in range(100):
         stood = DT * k - landing
         judge_jump(imu, (0.5 if k == 0 else 0.0, 0.0, 0.0), 0.0 <= stood <= SHAKEN, DT)
         if imu.gyro_is_off > 0.0:
             return DT * k
+        if DT * k < seen_after:
+            continue
         imu.jump_seen = imu.jump_lacks = imu.jump_residual = imu.any_seen = 1.0
         imu.any_lacks = 0.0 if 0.0 <= stood < 0.8 * SHAKEN else 1.0  # it slides
     return math.inf
@@ -436,3 +440,9 @@ def test_a_jump_of_the_gyro_as_a_foot_lands_has_to_be_shown_for_longer(
     A landing on the edge of a step is one: 2 of 20 sound gyros were named on stairs of 13 cm.
     """
     assert named_after(landing) == pytest.approx(lasts, abs=2.1 * DT)
+
+
+def test_feet_that_come_down_long_after_it_do_not_show_a_jump() -> None:
+    """After a flight they slide: a sound gyro was accused on blocks at 1 m/s."""
+    assert named_after(0.0, SEEN_AFTER - 0.02) < LONGEST_JUMP
+    assert math.isinf(named_after(0.0, SEEN_AFTER + 0.02))
