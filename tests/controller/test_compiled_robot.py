@@ -1,8 +1,12 @@
 """Compiled code against its own Python, call by call, while a robot is driven."""
 
-from benchmarks.plain import NEAR, difference, every_call_compared
+import pytest
+
 from controller import GO2Controller
+from controller.demo.steps import run_demo
 from go2_wbc.algebra import active_set
+from go2_wbc.plant import MujocoPlant
+from tests.compiled import NEAR, difference, every_call_compared
 
 
 def test_a_few_ticks_of_a_trot_are_what_their_python_makes() -> None:
@@ -23,3 +27,12 @@ def test_a_difference_is_told_and_the_kernels_are_as_before() -> None:
         assert type(active_set.solve_qp).__call__ is not before
     assert type(active_set.solve_qp).__call__ is before or "first_call" in before.__name__
     assert difference([1.0, float("nan")], [1.0 + 1e-6, float("nan")]) > NEAR
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sensors", ["ideal", "imu"])
+def test_every_call_of_the_demo_is_what_its_python_makes(sensors: str) -> None:
+    plant = MujocoPlant(sensors=sensors)
+    with every_call_compared() as tallies, GO2Controller(plant=plant) as go2:
+        assert run_demo(go2).ok
+    assert {name: tally.worst for name, tally in tallies.items() if tally.worst > NEAR} == {}
