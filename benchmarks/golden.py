@@ -5,22 +5,19 @@ tick a digest of what each stage made is kept, and of some the numbers, so that 
 told. Records hold for the machine that made them: another processor may round in another way.
 """
 
-from __future__ import annotations
-
 import logging
-import zipfile
+import pickle
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, fields
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Any
+from typing import Annotated
 from unittest.mock import patch
 
 import numpy as np
-from jaxtyping import Float, Int, UInt64
 
 from benchmarks.command import positive
 from benchmarks.golden_runs import KEPT_EVERY, RUNS, STAGES, Ledger, Values
@@ -30,89 +27,59 @@ from go2_wbc.errors import CommandError, ConfigError, unknown_name
 RECORD, COMPARE = "record", "compare"
 
 
-@dataclass(frozen=True, slots=True)
-class Stored:
-    """A recorded run."""
-
-    digests: UInt64[np.ndarray, "ticks stages"]  #: of each tick, by stage
-    sizes: Int[np.ndarray, "kept stages"]  #: of each kept tick, how many numbers each stage has
-    numbers: Float[np.ndarray, " n"]  #: of the kept ticks, one stage after the other
-    lines: list[str]  #: what came of its calls
-
-    @staticmethod
-    def of(ledger: Ledger) -> Stored:
-        """What ``ledger`` holds, as arrays."""
-        ticks = [[_row(values) for values in tick] for tick in ledger.kept]
-        sizes = np.array([[len(row) for row in tick] for tick in ticks], dtype=np.int64)
-        numbers = np.concatenate([row for tick in ticks for row in tick])
-        return Stored(np.array(ledger.digests, np.uint64), sizes, numbers, ledger.lines)
-
-    def write(self, file: Path) -> None:
-        """Write it."""
-        arrays: dict[str, Any] = {f.name: np.array(getattr(self, f.name)) for f in fields(self)}
-        np.savez_compressed(file, **arrays)
-
-    @staticmethod
-    def read(file: Path) -> Stored:
-        """Read it.
-
-        Raises:
-            ConfigError: if there is no such file, or it is damaged.
-        """
-        try:
-            with np.load(file) as data:
-                arrays = {name: data[name] for name in ("digests", "sizes", "numbers")}
-                return Stored(**arrays, lines=data["lines"].tolist())
-        except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
-            raise ConfigError(f"cannot read the golden run {file}: {error}") from error
-
-    def row(self, kept: int, stage: int) -> Float[np.ndarray, " n"]:
-        """The numbers of a stage of a kept tick."""
-        ends = np.cumsum(self.sizes)
-        cell = kept * self.sizes.shape[1] + stage
-        return self.numbers[ends[cell] - self.sizes[kept, stage] : ends[cell]]
+def written(ledger: Ledger, file: Path) -> None:
+    """Keep a run."""
+    file.write_bytes(zlib.compress(pickle.dumps(ledger), 1))
 
 
-def _row(values: Values) -> Float[np.ndarray, " n"]:
-    return np.concatenate([*values.values(), np.empty(0)])
+def read(file: Path) -> Ledger:
+    """A run that was kept; only of files that ``record`` wrote on this machine.
+
+    Raises:
+        ConfigError: if there is no such file, or it is damaged.
+    """
+    try:
+        return pickle.loads(zlib.decompress(file.read_bytes()))
+    except (OSError, zlib.error, pickle.UnpicklingError, AttributeError) as error:
+        raise ConfigError(f"cannot read the golden run {file}: {error}") from error
 
 
-def difference(stored: Stored, ledger: Ledger, tolerance: float) -> str | None:
+def difference(stored: Ledger, ledger: Ledger, tolerance: float) -> str | None:
     """How ``ledger`` differs from what was stored, in one line; None if it does not.
 
     With a ``tolerance`` a run is accepted whose numbers are as near as that in the first kept tick
     after the first difference: later ones grow, as the robot's feedback has them.
     """
-    found = np.array(ledger.digests, np.uint64)
-    common = min(len(found), len(stored.digests))
-    differs = found[:common] != stored.digests[:common]
+    found, before = (np.array(one.digests, np.uint64) for one in (ledger, stored))
+    common = min(len(found), len(before))
+    differs = found[:common] != before[:common]
     if differs.any():
         tick, stage = (int(place[0]) for place in np.nonzero(differs))
         largest, told = _numbers(stored, ledger, -(-tick // KEPT_EVERY), stage)
         if largest <= tolerance and tolerance > 0.0:
             return None
         return f"differs from tick {tick} on, first in the {list(STAGES)[stage]}: {told}"
-    if len(found) != len(stored.digests):
-        return f"has {len(found)} ticks instead of {len(stored.digests)}"
-    for now, before in zip(ledger.lines, stored.lines, strict=False):
-        if now != before:
-            return f"says {now!r} instead of {before!r}"
+    if len(found) != len(before):
+        return f"has {len(found)} ticks instead of {len(before)}"
+    for now, then in zip(ledger.lines, stored.lines, strict=False):
+        if now != then:
+            return f"says {now!r} instead of {then!r}"
     return None if len(ledger.lines) == len(stored.lines) else "says more or less than before"
 
 
-def _numbers(stored: Stored, ledger: Ledger, kept: int, stage: int) -> tuple[float, str]:
+def _numbers(stored: Ledger, ledger: Ledger, kept: int, stage: int) -> tuple[float, str]:
     """The largest difference in a kept tick, and what it is in ``stage``, or else in another."""
-    if kept >= min(len(stored.sizes), len(ledger.kept)):
+    if kept >= min(len(stored.kept), len(ledger.kept)):
         return np.inf, "the run ends before its numbers are kept again"
-    found = [_off(now, stored.row(kept, i)) for i, now in enumerate(ledger.kept[kept])]
+    found = [_off(*pair) for pair in zip(ledger.kept[kept], stored.kept[kept], strict=True)]
     order = [found[stage], *found]
     told = next((told for largest, told in order if largest > 0.0), "equal again")
     return max(largest for largest, _ in found), f"{told} at tick {kept * KEPT_EVERY}"
 
 
-def _off(now: Values, before: Float[np.ndarray, " n"]) -> tuple[float, str]:
+def _off(now: Values, then: Values) -> tuple[float, str]:
     """The largest difference of one stage, and which number that is."""
-    values = _row(now)
+    values, before = (np.concatenate([*one.values(), np.empty(0)]) for one in (now, then))
     if len(values) != len(before):
         return np.inf, f"{len(values)} numbers instead of {len(before)}"
     is_same = (values == before) | (np.isnan(values) & np.isnan(before))
@@ -138,11 +105,11 @@ def replay(name: str, folder: Path) -> Ledger:
 
 def work_on(name: str, act: str, folder: Path, tolerance: float) -> str | None:
     """Run it and write it, or tell how it differs from what was written."""
-    file = folder / f"{name}.npz"
+    file = folder / f"{name}.pickle"
     if act == COMPARE:
-        return difference(Stored.read(file), replay(name, folder), tolerance)
+        return difference(read(file), replay(name, folder), tolerance)
     file.with_suffix(".npy").unlink(missing_ok=True)
-    Stored.of(replay(name, folder)).write(file)
+    written(replay(name, folder), file)
     return None
 
 

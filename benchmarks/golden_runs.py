@@ -152,14 +152,16 @@ def walk(gait: str = "trot") -> Step:
     return lambda go2: go2.walk(gait)
 
 
-def move(x: float = 0.0, turn: float = 0.0, y: float = 0.0, wait: float = 2.0) -> Step:
-    """Walk like this for ``wait`` seconds."""
-    return lambda go2: (go2.move(x, turn, linear_y=y), go2.wait(wait))
-
-
-def pose(wait: float = 1.0, height: float = 0.0, roll: float = 0.0, pitch: float = 0.0) -> Step:
-    """Walk ahead in this pose."""
-    return lambda go2: (go2.move(0.3, height=height, roll=roll, pitch=pitch), go2.wait(wait))
+def move(
+    x: float = 0.0,
+    turn: float = 0.0,
+    y: float = 0.0,
+    wait: float = 2.0,
+    pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Step:
+    """Walk like this, at this height, roll and pitch, for ``wait`` seconds."""
+    how = dict(zip(("linear_y", "height", "roll", "pitch"), (y, *pose), strict=True))
+    return lambda go2: (go2.move(x, turn, **how), go2.wait(wait))
 
 
 def push(x: float, y: float, duration: float = 0.1, wait: float = 1.5, at: str = "base") -> Step:
@@ -178,11 +180,6 @@ def play(motion: Playable) -> Step:
     return lambda go2: go2.play(motion)
 
 
-def high_five(side: str) -> Step:
-    """Raise this paw for half a second."""
-    return lambda go2: go2.high_five(side, hold=0.5)
-
-
 def library(ledger: Ledger) -> None:
     """Every plan of the library at 200 instants, and what the check says of it."""
     checker = FeasibilityChecker(RobotModel())
@@ -198,12 +195,11 @@ def _margins(report: FeasibilityReport) -> Values:
     """The worst of every subject of every check, and sums over all instants."""
     found = {}
     for series in report.series:
-        sums = [np.nansum(series.values), np.nansum(series.margins)]
-        found[series.check] = np.array(sums, float)
+        found[series.check] = [np.nansum(series.values), np.nansum(series.margins)]
         for item in series.findings():
             numbers = [item.time, item.value, item.limit, item.margin]
-            found[f"{item.check} of {item.subject}"] = np.array(numbers, float)
-    return found
+            found[f"{item.check} of {item.subject}"] = numbers
+    return {name: np.array(numbers, float) for name, numbers in found.items()}
 
 
 def solves(ledger: Ledger, count: int = 300) -> None:
@@ -258,6 +254,9 @@ def _readings() -> Float[np.ndarray, "n 47"]:
 
 IMU = partial(MujocoPlant, sensors="imu", seed=3)
 STAND, STOP = GO2Controller.stand, GO2Controller.stop
+FIVES = tuple(partial(GO2Controller.high_five, side=side, hold=0.5) for side in ("left", "right"))
+POSES = ((-0.05, 0.0, 0.0), (0.0, 0.15, 0.0), (0.0, 0.0, -0.15))
+ORDER = ("walk", "pace", "flying_trot", "bound", "gallop", "pronk", "trot")
 SHOVED = Timeline(name="shoved", physics="nearest").body(y=0.09, over=0.16).hold(0.2).home(over=0.5)
 LEAP = Timeline(name="leap").jump(x=0.13, height=0.06)
 WAY = Timeline(name="way").walk(x=0.4).step("FR", x=0.05, over=0.5).home(over=0.5)
@@ -271,13 +270,7 @@ RUNS: dict[str, Callable[[Ledger], None]] = {
     "trot-noisy": RobotRun(
         (walk(), move(0.6, -0.5), STOP), partial(MujocoPlant, sensors="noisy", delay=0.004)
     ),
-    "gaits": RobotRun(
-        tuple(
-            step
-            for gait in ("walk", "pace", "flying_trot", "bound", "gallop", "pronk", "trot")
-            for step in (walk(gait), move(0.5, wait=1.2))
-        )
-    ),
+    "gaits": RobotRun(tuple(step for gait in ORDER for step in (walk(gait), move(0.5, wait=1.2)))),
     "gait-auto": RobotRun((walk("auto"), move(0.2), move(0.9), move(2.0), STOP)),
     "push-trot": RobotRun(
         (walk(), move(0.5), push(0, 300), push(-300, 0), push(0, 90, at="FL_foot"))
@@ -294,9 +287,9 @@ RUNS: dict[str, Callable[[Ledger], None]] = {
         (walk(), move(0.5, 0.3), STOP),
         partial(MujocoPlant, payload=4.0, payload_place=(0.0, 0.08, 0.1)),
     ),
-    "high-five": RobotRun((high_five("left"), high_five("right"))),
-    "high-five-imu": RobotRun((high_five("left"), high_five("right")), IMU),
-    "pose": RobotRun((walk(), pose(height=-0.05), pose(roll=0.15), pose(pitch=-0.15), STOP)),
+    "high-five": RobotRun(FIVES),
+    "high-five-imu": RobotRun(FIVES, IMU),
+    "pose": RobotRun((walk(), *(move(0.3, wait=1.0, pose=pose) for pose in POSES), STOP)),
     "goals": RobotRun((walk(), lambda go2: go2.turn_left(0.8), lambda go2: go2.move_forward(0.5))),
     "play-feet": RobotRun((STAND, play("knock"), play("cross_step"), play("hula")), IMU),
     "play-walks": RobotRun((STAND, play("zigzag"), play("sit_pretty"))),

@@ -14,6 +14,7 @@ from benchmarks.golden_runs import KEPT_EVERY, RUNS, STAGES, Ledger, RobotRun
 from controller import GO2Controller
 from controller.cli.common import ExitCode
 from go2_wbc.config import Config
+from go2_wbc.errors import ConfigError
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.state import JointCommand
 
@@ -85,12 +86,11 @@ def test_every_field_of_every_stage_counts() -> None:
     made["report"] = {"torque": np.array([1.0, 2.0])}
     before = Ledger(Path())
     before.tick(made)
-    stored = golden.Stored.of(before)
     for stage, values in made.items():
         for name in values:
             now = Ledger(Path())
             now.tick({**made, stage: {**values, name: np.array([1.0, np.nextafter(2.0, 3.0)])}})
-            told = golden.difference(stored, now, 0.0)
+            told = golden.difference(before, now, 0.0)
             assert told is not None
             assert told.startswith(
                 f"differs from tick 0 on, first in the {stage}: {name}[1] by 4.44"
@@ -104,7 +104,7 @@ def test_a_digest_tells_minus_zero_from_zero_and_the_tick_is_named() -> None:
             found.tick({"command": JointCommand.torque(np.full(12, tau if number == 7 else 0.0))})
         return found
 
-    told = golden.difference(golden.Stored.of(ledger(0.0)), ledger(-0.0), 0.0)
+    told = golden.difference(ledger(0.0), ledger(-0.0), 0.0)
     assert told == "differs from tick 7 on, first in the command: equal again at tick 20"
 
 
@@ -115,7 +115,7 @@ def test_a_run_that_is_shorter_or_says_something_else_is_told() -> None:
             found.tick({"command": JointCommand.damping(1.0)})
         return found
 
-    stored = golden.Stored.of(ledger(3, "done"))
+    stored = ledger(3, "done")
     assert golden.difference(stored, ledger(3, "done"), 0.0) is None
     assert golden.difference(stored, ledger(2, "done"), 0.0) == "has 2 ticks instead of 3"
     assert golden.difference(stored, ledger(3, "fell"), 0.0) == "says 'fell' instead of 'done'"
@@ -124,11 +124,15 @@ def test_a_run_that_is_shorter_or_says_something_else_is_told() -> None:
 def test_a_record_keeps_everything(tmp_path: Path) -> None:
     ledger = Ledger(tmp_path, lines=["a line"])
     runs(Config())["rise"](ledger)
-    stored = golden.Stored.of(ledger)
-    stored.write(tmp_path / "run.npz")
-    read = golden.Stored.read(tmp_path / "run.npz")
-    for name in ("digests", "sizes", "numbers", "lines"):
-        assert np.array_equal(getattr(read, name), getattr(stored, name)), name
+    golden.written(ledger, tmp_path / "run")
+    read = golden.read(tmp_path / "run")
+    assert (read.digests, read.lines) == (ledger.digests, ledger.lines)
+    assert len(read.kept) == len(ledger.kept) > 1
+    for name in ("digests", "kept", "lines"):
+        np.testing.assert_equal(getattr(read, name), getattr(ledger, name))
+    (tmp_path / "run").write_bytes(b"damaged")
+    with pytest.raises(ConfigError, match="cannot read the golden run"):
+        golden.read(tmp_path / "run")
 
 
 def test_what_was_patched_is_as_it_was() -> None:
