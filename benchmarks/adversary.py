@@ -9,21 +9,20 @@ verdict and its chance, and of physics what was played; limits, margins and equa
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
 
 from benchmarks.adversary_motions import COUNT, FAMILIES, Numbers
 from benchmarks.command import Benchmark
+from benchmarks.robots import checker
 from benchmarks.study import Study, TrialResult
 from benchmarks.validation_set.physics import play
-from controller.motion_measurement import MotionMeasurement, failures_of, shares_of
+from controller.motion_measurement import failures_of, shares_of
 from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.errors import MotionError
 from go2_wbc.motion_plan import MotionPlan
-from go2_wbc.robot.model import RobotModel
-from motions import FeasibilityChecker
 
 PLAYS = 20  # Of a search
 STATED = 0.95  #: Chance from which on a pass counts
@@ -83,14 +82,11 @@ class Search:
     def _next(self, best: Attempt | None) -> tuple[Attempt, MotionPlan] | None:
         """A motion that is passed, beside ``best`` or anywhere."""
         for _ in range(MOST_CHECKS):
-            goal = self.rng.random(COUNT)
-            if best is None:
-                halvings, start = 0, goal
-            else:
-                halvings, start = HALVINGS, best.numbers
-                step = self.width * self.rng.standard_normal(COUNT)
-                goal = np.clip(start + step * (goal < CHANGED), 0.0, 1.0)
-            for k in range(halvings + 1):
+            start = goal = self.rng.random(COUNT)
+            if best is not None:
+                step = self.width * self.rng.standard_normal(COUNT) * (goal < CHANGED)
+                start, goal = best.numbers, np.clip(best.numbers + step, 0.0, 1.0)
+            for k in range(1 if best is None else HALVINGS + 1):
                 numbers = start + (goal - start) / 2**k
                 if (found := passed(self.family, numbers)) is not None:
                     return Attempt(numbers, found[0]), found[1]
@@ -110,9 +106,10 @@ def measure(trial: Trial, found: TrialResult, family: str) -> None:
         "plays": float(plays),
         "worst": max((attempt.worst for attempt in one.played), default=0.0),
     }
-    for k, a in enumerate(wrong):
-        numbers = np.round(a.numbers, 5).tolist()
-        found.notes[f"find {k}"] = f"{a.chance:.3f} {'; '.join(a.harm)} {numbers}"
+    found.notes = {
+        f"find {k}": f"{a.chance:.3f} {'; '.join(a.harm)} {np.round(a.numbers, 5).tolist()}"
+        for k, a in enumerate(wrong)
+    }
 
 
 def passed(
@@ -134,30 +131,20 @@ def outcome(plan: MotionPlan) -> tuple[tuple[str, ...], float]:
         run = play(plan, checker().model, 0)
     except TrialFailed as error:
         return (str(error),), FAILED
-    return failures_of(run, plan), _worst(run, plan)
-
-
-def _worst(run: MotionMeasurement, plan: MotionPlan) -> float:
     share = max(share for share, _ in shares_of(run, plan).values())
-    return FALL if run.fall else share if run.said else max(share, FAILED)
-
-
-@lru_cache(maxsize=1)
-def checker() -> FeasibilityChecker:
-    """Made once in each process."""
-    return FeasibilityChecker(RobotModel())
+    worst = FALL if run.fall else share if run.said else max(share, FAILED)
+    return failures_of(run, plan), worst
 
 
 STUDIES = tuple(
     Study(name, {f"{name}, passed at {STATED}": ROWS}, partial(measure, family=name), sensors=None)
     for name in FAMILIES
 )
-BENCHMARK = Benchmark(
+run = Benchmark(
     "adversary",
     "Searches for motions that the check passes at a high chance and that fail in\n"
     f"MuJoCo; a seed is a search of {PLAYS} plays.",
     STUDIES,
     takes="half an hour on two cores",
     examples=("--seeds 25", "--rows trots static --seeds 2"),
-)
-run = BENCHMARK.run
+).run

@@ -5,17 +5,14 @@ MuJoCo judges. Motors with their torque-speed line, friction 0.6 to 1.0 (drops: 
 within 10 %, of which the controller is not told. Numbers were chosen on seeds 0 to 9, from 9000 and
 from 30000 to 63999; those judged begin at ``FIRST_SEED``.
 
-- standing: a push of 0.1 s in each of eight directions, 36 N s aside, 45 ahead and back, on an
-  ellipse in between; survived is who stands again within 3 s;
-- trotting: a push of 0.1 s at 16 phases of the stride, at 0.5 m/s; survived as in ``behaviour``;
+- standing: impulses of the directions lie on an ellipse; survived is who stands again within 3 s;
+- trotting: survived is who still trots two seconds later, at about its speed;
 - recover: limp, any attitude, any joint angles, up to 0.5 m above the ground;
-- gaits: ten changes to a random gait, or stops, with a random velocity in its envelope;
-- commands: random velocities ahead, aside and turning for two minutes, a new one every 1.5 s;
-- disturbed: random calls and velocities under random pushes, recovering from every fall; see
-  ``benchmarks.disturbed``.
+- disturbed: see ``benchmarks.disturbed``.
 """
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -52,6 +49,8 @@ GENTLE = VelocityEnvelope(forward=1.2, backward=1.2, lateral=0.5, turning=1.5)
 """Of the trot's changes; those of the other gaits are in proportion."""
 CHANGES = 10
 COMMANDS = 80  # Random velocities of a run, two minutes of them
+Course = Callable[[TrialRobot, np.random.Generator, int], Iterator[float]]
+"""Does a number of things, and gives the time [s] that passes after each."""
 
 
 def impulse_at(angle: float) -> float:
@@ -77,14 +76,21 @@ def measure_standing(trial: Trial, found: TrialResult, direction: int) -> None:
 
 
 def measure_trotting(trial: Trial, found: TrialResult, push: str) -> None:
-    """Push the trotting robot at every phase; the share of phases that it survives."""
+    """Push the trotting robot at every phase."""
+    found.values[""] = share_of_phases(trial, FIRST_SEED, push, trots_on)
+
+
+def share_of_phases(
+    trial: Trial, first_seed: int, push: str, goes_on: Callable[[TrialRobot, int, np.ndarray], bool]
+) -> float:
+    """The share of the phases of the stride at which a robot goes on under a push [N]."""
     angle, impulse = TROT_PUSHES[push]
     survived = 0
     for phase in range(PHASES):
         side = 1.0 if phase % 2 or push != "lateral" else -1.0
-        with TrialRobot(plant_of(trial, FIRST_SEED, UNTOLD)) as robot:
-            survived += trots_on(robot, phase, heading_force(side * angle, impulse))
-    found.values[""] = survived / PHASES
+        with TrialRobot(plant_of(trial, first_seed, UNTOLD)) as robot:
+            survived += goes_on(robot, phase, heading_force(side * angle, impulse))
+    return survived / PHASES
 
 
 def trots_on(robot: TrialRobot, phase: int, force: np.ndarray) -> bool:
@@ -131,48 +137,43 @@ def measure_recovery(trial: Trial, found: TrialResult) -> None:
 
 def measure_gaits(trial: Trial, found: TrialResult) -> None:
     """Change the gait, or stop, again and again."""
-    rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
-    with TrialRobot(plant_of(trial, FIRST_SEED, UNTOLD)) as robot:
-        robot.require(robot.go2.stand())
-        robot.require(robot.go2.walk())
-        try:
-            for _ in range(CHANGES):
-                _change(robot, rng)
-                done += 1
-        except TrialFailed as failed:
-            found.notes[""] = str(failed)
-    found.values[""] = done / CHANGES
+    _follow(trial, found, changing, CHANGES)
 
 
-def _change(robot: TrialRobot, rng: np.random.Generator) -> None:
+def changing(robot: TrialRobot, rng: np.random.Generator, count: int) -> Iterator[float]:
     """A stop, or another gait at a velocity in its envelope; then some time."""
-    if rng.random() < 0.2:
-        robot.go2.stop()
-    else:
-        gait = GAITS[str(rng.choice(list(GAITS)))]
-        robot.require(robot.go2.walk(gait))
-        most = envelope_of(gait, GENTLE)
-        bounds = most.forward, most.lateral, most.turning
-        x, y, turn = rng.uniform(-1.0, 1.0, 3) * bounds
-        robot.go2.move(x, turn, linear_y=y)
-    robot.wait(float(rng.uniform(0.3, 1.5)))
+    for _ in range(count):
+        if rng.random() < 0.2:
+            robot.go2.stop()
+        else:
+            gait = GAITS[str(rng.choice(list(GAITS)))]
+            robot.require(robot.go2.walk(gait))
+            most = envelope_of(gait, GENTLE)
+            x, y, turn = rng.uniform(-1.0, 1.0, 3) * (most.forward, most.lateral, most.turning)
+            robot.go2.move(x, turn, linear_y=y)
+        yield float(rng.uniform(0.3, 1.5))
 
 
 def measure_commands(trial: Trial, found: TrialResult) -> None:
     """Follow random velocities; ticks in which the QP had no answer are counted."""
+    found.values["failures"] = _follow(trial, found, commanded, COMMANDS)
+
+
+def _follow(trial: Trial, found: TrialResult, course: Course, count: int) -> float:
+    """Note the share of a course's ``count`` parts that are done; gives how often the QP failed."""
     rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
     with TrialRobot(plant_of(trial, FIRST_SEED, UNTOLD)) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         try:
-            for seconds in commanded(robot, rng, COMMANDS):
+            for seconds in course(robot, rng, count):
                 robot.wait(seconds)
                 robot.truth.clear()  # two minutes' recording would be two gigabytes
                 done += 1
         except TrialFailed as failed:
             found.notes[""] = str(failed)
-        failures = float(robot.go2.telemetry.qp_failures)
-    found.values = {"": done / COMMANDS, "failures": failures}
+        found.values[""] = done / count
+        return float(robot.go2.telemetry.qp_failures)
 
 
 _STANDING = f"standing, push 0.1 s, {ASIDE:g} N s aside, {AHEAD:g} ahead"
@@ -213,14 +214,11 @@ STUDIES = (
     *(replace(study, group="truth") for study in ON_TRUTH),
     *(study.sensed("sensors") for study in ON_TRUTH),
 )
-"""In the order of the report."""
 
-
-BENCHMARK = Benchmark(
+run = Benchmark(
     "balance",
     "Pushes, drops, changes of gait, and whether a fall is noticed.\n"
     "Drops take 10 times the seeds, disturbed runs 50 times.",
     STUDIES,
     examples=("--rows sensors", "--rows recover sensed-recover"),
-)
-run = BENCHMARK.run
+).run

@@ -32,22 +32,16 @@ GOALS = {
 
 
 def measure_stand(trial: Trial, found: TrialResult) -> None:
-    """Stand up from lying.
-
-    - time: from the call of ``stand()`` to its return, in plant time;
-    - peak torque: largest |tau| / limit of any joint on the way;
-    - final CoM height off: |height of MuJoCo's CoM over the floor - 0.29 m| when ``stand()``
-      returns.
-    """
+    """Stand up from lying; values are of plant time, and of MuJoCo's CoM when ``stand()`` ends."""
     with TrialRobot(trial) as robot:
         start = robot.plant.time
         robot.require(robot.go2.stand())
         recorded = robot.truth.recording()
+        off = float(recorded.p_world_com[-1, 2]) - find_profile().stand_height
         found.values = {
             "time": robot.plant.time - start,
             "torque": float(recorded.torque_shares(RobotModel()).max()),
-            "height": 1000.0
-            * abs(float(recorded.p_world_com[-1, 2]) - find_profile().stand_height),
+            "height": 1000.0 * abs(off),
             "tilt": math.degrees(robot.plant.truth().tilt),
         }
         if failure := standing_failure(robot):
@@ -55,12 +49,7 @@ def measure_stand(trial: Trial, found: TrialResult) -> None:
 
 
 def measure_goals(trial: Trial, found: TrialResult) -> None:
-    """Stand, walk one metre, turn a quarter to the left.
-
-    - distance from the goal: of the base, in the plane, from the point one metre ahead of where it
-      was, along its heading then;
-    - heading and angle errors: of the base's yaw, against before the call.
-    """
+    """Stand, walk one metre, turn a quarter to the left; errors are against before each call."""
     with TrialRobot(trial) as robot:
         robot.require(robot.go2.stand())
         start = robot.plant.truth()
@@ -83,7 +72,6 @@ STUDIES: tuple[Study, ...] = (
     library.ON_TRUTH,
     demo_sequence.STUDY,
 )
-"""In the order of the report."""
 BENCHMARK = Benchmark(
     "behaviour",
     "Stand, goals, high five, slaps, the motions and the whole demo\n"

@@ -12,12 +12,15 @@ from typing import Annotated
 
 import numpy as np
 
-from benchmarks.adversary import FIRST, checker, outcome
+from benchmarks.adversary import FIRST, outcome
 from benchmarks.adversary_motions import COUNT, FAMILIES, Numbers
 from benchmarks.command import Jobs, Output, RowsFile, positive, run_sweep
-from benchmarks.probability_fit import calibration
+from benchmarks.probability_fit import Bins, calibration
+from benchmarks.robots import checker
+from benchmarks.validation_set.physics import bisected
 from controller.cli.common import ExitCode
 from controller.sweeps.sweep_file import Row
+from controller.sweeps.trials import TrialFailed
 from go2_wbc.errors import MotionError
 from go2_wbc.motion_plan import MotionPlan
 
@@ -70,27 +73,27 @@ def asked(seed: int) -> dict[str, object]:
     sizes = [(RANDOM, 1.0)]
     if (size := border_of(family, numbers)) is not None:
         sizes += [(BESIDE, size * rng.uniform(*share)) for share in (BELOW, ABOVE)]
-    found = [(kind, *_said_and_done(family, numbers, size)) for kind, size in sizes]
+    found: list[tuple[str, bool, float, bool]] = []  # kind, passed, chance, done
+    for kind, factor in sizes:
+        if (plan := _plan(family, numbers, factor)) is None:
+            found.append((kind, False, 0.0, False))
+        else:
+            report = checker().check(plan)
+            found.append((kind, report.ok, report.probability, not outcome(plan)[0]))
     return {"family": family, "border": size or 0.0, "motions": json.dumps(found)}
 
 
 def border_of(family: str, numbers: Sequence[float]) -> float | None:
     """The size at which physics changes its mind, if there is one; the check is not asked."""
-    done, failed, size = SMALLEST, LARGEST, 1.0
-    is_low_done = is_high_failed = False
-    while not (is_low_done and is_high_failed) or failed / done > NEAR:
+
+    def is_done(size: float) -> bool:
         plan = _plan(family, numbers, size)
-        if plan is not None and not outcome(plan)[0]:
-            done, is_low_done = size, True
-        else:
-            failed, is_high_failed = size, True
-        if is_low_done and is_high_failed:
-            size = math.sqrt(done * failed)
-        elif size in (SMALLEST, LARGEST):
-            return None
-        else:
-            size = min(max(size * STEP if is_low_done else size / STEP, SMALLEST), LARGEST)
-    return math.sqrt(done * failed)
+        return plan is not None and not outcome(plan)[0]
+
+    try:
+        return bisected(is_done, SMALLEST, LARGEST, STEP, NEAR)
+    except TrialFailed:
+        return None
 
 
 def _plan(family: str, numbers: Sequence[float], size: float) -> MotionPlan | None:
@@ -101,31 +104,18 @@ def _plan(family: str, numbers: Sequence[float], size: float) -> MotionPlan | No
         return None
 
 
-def _said_and_done(family: str, numbers: Sequence[float], size: float) -> tuple[bool, float, bool]:
-    """Whether a motion passes, at which chance, and whether physics does it."""
-    plan = _plan(family, numbers, size)
-    if plan is None:
-        return False, 0.0, False
-    report = checker().check(plan)
-    return report.ok, report.probability, not outcome(plan)[0]
-
-
 Shares = dict[str, tuple[float, int]]
 """By the names of ``BARS``: what was measured, and of how many motions."""
-Bins = tuple[tuple[float, float, int], ...]
 
 
 def measured(rows: Sequence[Row]) -> tuple[Shares, Bins]:
     """Every share, and the bins of the calibration."""
-    said = [(row["seed"], *one) for row in rows for one in json.loads(str(row["motions"]))]
-    found: dict[str, list[bool]] = {
-        kind: [done for _, of, ok, _, done in said if of == kind and ok]
-        for kind in (RANDOM, BESIDE)
-    }
-    found["refused"] = [not done for _, of, ok, _, done in said if of == BESIDE and not ok]
-    shares = {k: (float(np.mean(v)) if v else math.nan, len(v)) for k, v in found.items()}
-    chances, done = (np.array([one[k] for one in said]) for k in (3, 4))
-    error = calibration(chances, done, [str(one[0]) for one in said])
+    said = [(str(row["seed"]), *one) for row in rows for one in json.loads(str(row["motions"]))]
+    seeds, kinds, passed, chances, done = (np.array(column) for column in zip(*said, strict=True))
+    found = {kind: done[(kinds == kind) & passed] for kind in (RANDOM, BESIDE)}
+    found["refused"] = ~done[(kinds == BESIDE) & ~passed]
+    shares = {k: (float(v.mean()) if len(v) else math.nan, len(v)) for k, v in found.items()}
+    error = calibration(chances, done, seeds.tolist())
     return {**shares, ERROR: (error.error, len(said))}, error.bins
 
 

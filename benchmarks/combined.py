@@ -16,6 +16,8 @@ Numbers were chosen on seeds 0 to 99; those that are judged begin at ``FIRST_SEE
 
 import math
 import resource
+from contextlib import closing
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -124,9 +126,9 @@ def measure_curve(trial: Trial, found: TrialResult) -> None:
 
 def measure_long(trial: Trial, found: TrialResult) -> None:
     """Walk in circles, and raise a paw again and again."""
-    plant = MujocoPlant(seed=FIRST_SEED + trial.seed, sensors=trial.sensors)
     found.values["circles"] = found.values["fives"] = 0.0
-    with GO2Controller(plant=plant) as go2:
+    plant = MujocoPlant(seed=FIRST_SEED + trial.seed, sensors=trial.sensors)
+    with closing(plant), GO2Controller(plant=plant) as go2:
         walks = go2.walk()
         go2.move(0.5, 0.5)
         go2.wait(FULL_AFTER)
@@ -138,7 +140,6 @@ def measure_long(trial: Trial, found: TrialResult) -> None:
         plan = compile_timeline(load_motion("high_five", hold=0.5), RobotModel())
         found.values["fives"] = float(sum(go2.high_five(plan=plan) for _ in range(FIVES)))
         found.values["memory"] = _resident() - held
-    plant.close()
 
 
 def _resident() -> float:
@@ -147,50 +148,41 @@ def _resident() -> float:
     return pages * resource.getpagesize() / 1e6
 
 
-def _rest(robot: Robot) -> Study:
-    rows = [(call, f"{call} as it says", ">= 1") for call in CALLS]
-    measure = partial(measure_rest, robot=robot)
-    return Study(f"rest-{robot.name}", {f"16 walks, {robot.item}": rows}, measure, group="rest")
+REST_ROWS = [(call, f"{call} as it says", ">= 1") for call in CALLS]
+CURVE = {"(0.8, 0.3) m/s, 1 rad/s over boxes of 8 cm": [("done", "share done", ">= 1")]}
+LONG = {
+    "10 minutes of circles, 200 high fives": [
+        ("circles", "circles done", ">= 1"),
+        ("fives", "high fives done", f">= {FIVES}"),
+        ("memory", "more memory", "<= 20 MB"),
+    ]
+}
+_REST = tuple(
+    Study(f"rest-{robot.name}", {f"16 walks, {robot.item}": REST_ROWS}, measure, group="rest")
+    for robot in RESTING
+    for measure in (partial(measure_rest, robot=robot),)
+)
 
 
 def _combined(delay: float, friction: float) -> Study:
     item = f"{1000 * delay:g} ms late, friction {friction:g}, 0 and 4 kg, 0.5 and 1.0 m/s"
     rows = [("done", "share done", ">= 0.99" if delay <= LATEST else ">=")]
     measure = partial(measure_combined, delay=delay, friction=friction)
-    name = f"late-{1000 * delay:g}-on-{friction:g}"
-    return Study(name, {item: rows}, measure, group="combined")
+    return Study(f"late-{1000 * delay:g}-on-{friction:g}", {item: rows}, measure)
 
 
-_ALL = (
-    *map(_rest, RESTING),
+_COMBINED = (
     *(_combined(*cell) for cell in product(DELAYS, FRICTIONS)),
-    Study(
-        "curve-boxes",
-        {"(0.8, 0.3) m/s, 1 rad/s over boxes of 8 cm": [("done", "share done", ">= 1")]},
-        measure_curve,
-        done="done",
-        group="combined",
-    ),
-    Study(
-        "long",
-        {
-            "10 minutes of circles, 200 high fives": [
-                ("circles", "circles done", ">= 1"),
-                ("fives", "high fives done", f">= {FIVES}"),
-                ("memory", "more memory", "<= 20 MB"),
-            ]
-        },
-        measure_long,
-        group="combined",
-    ),
+    Study("curve-boxes", CURVE, measure_curve, done="done"),
+    Study("long", LONG, measure_long),
 )
-STUDIES = (*_ALL, *(study.sensed(study.group) for study in _ALL))  #: In the order of the report
+_ALL = (*_REST, *(replace(study, group="combined") for study in _COMBINED))
+STUDIES = (*_ALL, *(study.sensed(study.group) for study in _ALL))
 
-BENCHMARK = Benchmark(
+run = Benchmark(
     "combined",
     "Rest after walks; late commands on slippery ground with a load.",
     STUDIES,
     takes="three hours on two cores",
     examples=("--rows rest --seeds 1", "--rows late-10-on-0.2"),
-)
-run = BENCHMARK.run
+).run

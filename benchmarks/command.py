@@ -171,9 +171,8 @@ def measure_all(name: str, tasks: Sequence[Task], *, jobs: int, resume: bool) ->
         if kept.finished:
             print(f"{len(kept.finished)} finished trials are taken from {folder}", file=sys.stderr)
         left = [(s, seed) for s, seed in tasks if (s.name, seed) not in kept.finished]
-        for study, seed in tasks:
-            if result := kept.finished.get((study.name, seed)):
-                results[study.name][seed] = result
+        for study, seed in {(s.name, seed) for s, seed in tasks} & kept.finished.keys():
+            results[study][seed] = kept.finished[study, seed]
         line.update(0.0, "starting")
         for study, seed, result in run_tasks(left, jobs):
             kept.add(study, seed, result)

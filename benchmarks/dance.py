@@ -5,17 +5,17 @@ to a file and found again: what is judged is the whole way from the file to the 
 finder and the lead of the choreography were tuned on songs with seeds below 100.
 """
 
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from benchmarks.command import Benchmark
+from benchmarks.robots import checker
 from benchmarks.study import Study, TrialResult
 from controller.motion_measurement import during_motion
 from controller.sweeps.trials import Trial, TrialRobot
-from motions import FeasibilityChecker
 from motions.music import Beats, Song, beats, click_track, danced, feasible_dance, made_song
 from motions.music.choreography import ON_THE_BEAT
 
@@ -46,21 +46,16 @@ ROWS = (
     ("heard", "heard beat off, mean", "ms"),
     ("bars", "bars begun where heard", "share"),
 )
-"""What is counted in every trial."""
 
 
 def measure(trial: Trial, found: TrialResult, kind: str) -> None:
     """Find the beats, compose, dance, and compare with the beats that the song was made with.
 
-    - moves: of the dance;
-    - accents within 40 ms: of a true beat; one that did not happen is none of them;
-    - accent off its beat: of those that happened;
-    - heard beat off the true: of the pulses on which the dance is composed;
-    - bars begun where heard: of those of the dance, the share within 40 ms of a true one.
+    An accent that did not happen is on no beat, and not counted by its mean. Heard are the pulses
+    on which the dance is composed; a bar is begun where it is within 40 ms of a true one.
     """
     song = song_of(kind, trial.seed)
-    checker = _checker()
-    dance, checked = feasible_dance(heard(song), trial.seed, checker)
+    dance, checked = feasible_dance(heard(song), trial.seed, checker())
     with TrialRobot(trial) as robot:
         robot.require(robot.go2.stand())
         robot.truth.clear()
@@ -78,29 +73,16 @@ def measure(trial: Trial, found: TrialResult, kind: str) -> None:
     }
 
 
-@cache
-def _checker() -> FeasibilityChecker:
-    """Made once for all trials of a process."""
-    return FeasibilityChecker()
-
-
+SONGS = {"clicks": "click track", "song": "made song", "waltz": "made waltz"}
 STUDIES = tuple(
-    Study(kind, {item: ROWS}, partial(measure, kind=kind))
-    for kind, item in (
-        ("clicks", "dance to a click track, 30 s"),
-        ("song", "dance to a made song, 30 s"),
-        ("waltz", "dance to a made waltz, 30 s"),
-    )
+    Study(kind, {f"dance to a {song}, 30 s": ROWS}, partial(measure, kind=kind))
+    for kind, song in SONGS.items()
 )
-"""In the order of the report."""
-
-
-BENCHMARK = Benchmark(
+run = Benchmark(
     "dance",
     "Dances to songs whose true beats are known: how many accents of the measured\n"
     "robot are on a beat. Needs the extra [music].",
     STUDIES,
     takes="minutes on two cores",
     examples=("--rows clicks --json",),
-)
-run = BENCHMARK.run
+).run

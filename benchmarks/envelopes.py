@@ -36,14 +36,9 @@ SEEDS = 4
 ERROR, SATURATED = 0.05, 0.05  # Share of the command, and of the ticks
 LEAST_ERROR = 0.02  #: m/s, rad/s; an error below it is none, however slow the command
 LEAD, WINDOW = 1.0, 2.0  #: Time [s] after the ramp that is left out, and that is measured
-WAYS = {
-    "forward": np.array([1.0, 0.0, 0.0]),
-    "backward": np.array([-1.0, 0.0, 0.0]),
-    "lateral": np.array([0.0, 1.0, 0.0]),
-    "turning": np.array([0.0, 0.0, 1.0]),
-}
-"""Ahead, to the left, turning to the left."""
 MOST = {"forward": 4.0, "backward": 3.0, "lateral": 2.0, "turning": 7.0}  # m/s, rad/s
+WAYS = dict(zip(MOST, np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, 0, 1.0]]), strict=True))
+"""Ahead, to the left, turning to the left."""
 STEPS = 6  # Halvings: a bound is exact to a 64th of ``MOST``
 ITEMS = tuple(product(GAITS, MOST))
 CONFIG = Config(envelope=VelocityEnvelope(forward=1e3, backward=1e3, lateral=1e3, turning=1e3))
@@ -131,8 +126,7 @@ def write(bounds: dict[str, dict[str, float]], file: Path = FILE) -> None:
 
 def render(bounds: dict[str, dict[str, float]]) -> str:
     """The table, at most 80 columns wide."""
-    lines = [f"{'gait':<14}" + "".join(f"{axis:>16}" for axis in MOST), "-" * 78]
-    for gait, values in bounds.items():
-        cells = (f"{values[axis]:>16.2f}" if axis in values else f"{'?':>16}" for axis in MOST)
-        lines.append(f"{gait:<14}" + "".join(cells))
-    return "\n".join([*lines, "m/s; turning in rad/s"])
+    rows = {gait: [f"{v[a]:.2f}" if a in v else "?" for a in MOST] for gait, v in bounds.items()}
+    lines = [f"{gait:<14}{''.join(map('{:>16}'.format, row))}" for gait, row in rows.items()]
+    head = f"{'gait':<14}{''.join(map('{:>16}'.format, MOST))}"
+    return "\n".join([head, "-" * 78, *lines, "m/s; turning in rad/s"])

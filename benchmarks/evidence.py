@@ -8,18 +8,19 @@ or two: on the true state and on the robot's own sensors.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
+import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
 
-from benchmarks.figures import SpeedLine, SpeedPanel, speed_figure
 from controller.cli.common import ExitCode, plot_file
 from go2_wbc.errors import ConfigError
-from viz.style import ACCENT, MUTED, TIGHT, save_figure
+from viz.style import ACCENT, INK, MUTED, STYLE, TIGHT, TRACK, save_figure
 
 MARK, END = "<!-- evidence:", "<!-- evidence:end -->"
 """What stands above a table, with its name, and below it."""
@@ -29,10 +30,11 @@ STATES = (("true state", ACCENT), ("own sensors", TIGHT))
 PEER = {0.5: 7.0, 0.8: 9.5, 1.0: 12.0}
 """Mean error [%] of go2-convex-mpc over its speed [m/s], on the true state (measured 2026-11)."""
 PANELS = (
-    ("mean", "error of the mean speed, %", True),
-    ("mae", "mean absolute error, m/s", False),
-    ("saturated", "ticks with a motor at all it has, %", False),
+    ("mean", "error of the mean speed, %", "log"),
+    ("mae", "mean absolute error, m/s", "linear"),
+    ("saturated", "ticks with a motor at all it has, %", "linear"),
 )
+FIGURE_SIZE = (9.0, 2.8)  # [inch]
 Row = Mapping[str, Any]  #: A row of a benchmark's JSON
 
 
@@ -53,23 +55,24 @@ class Line:
         Raises:
             ConfigError: if a metric is missing or has no value.
         """
-        cells = [self.what, *(self._pair(rows) if len(self.metrics) > 1 else self._one(rows))]
-        return f"| {' | '.join([*cells, self.peer])} |"
+        if len(self.metrics) > 1:
+            cells = [self.bar, *(self._cell(rows, name) if name else "-" for name in self.metrics)]
+        else:
+            (metric,) = self.metrics
+            found = self._found(rows, metric, "mean", "worst")
+            cells = [str(found["n"]), *(self.shown.format(found[key]) for key in ("mean", "worst"))]
+        return f"| {' | '.join([self.what, *cells, self.peer])} |"
 
-    def _one(self, rows: Mapping[str, Row]) -> list[str]:
-        (metric,) = self.metrics
-        found = rows.get(metric)
-        if found is None or found["mean"] is None or found["worst"] is None:
-            raise ConfigError(f"the results have no value for {metric}")
-        return [str(found["n"]), *(self.shown.format(found[key]) for key in ("mean", "worst"))]
-
-    def _pair(self, rows: Mapping[str, Row]) -> list[str]:
-        return [self.bar, *(self._cell(rows, name) if name else "-" for name in self.metrics)]
+    @staticmethod
+    def _found(rows: Mapping[str, Row], name: str, *needed: str) -> Row:
+        found = rows.get(name)
+        if found is None or any(found[key] is None for key in needed):
+            raise ConfigError(f"the results have no value for {name}")
+        return found
 
     def _cell(self, rows: Mapping[str, Row], name: str) -> str:
-        found = rows.get(name)
-        if found is None or (found["mean"] is None and not found["falls"]):
-            raise ConfigError(f"the results have no value for {name}")
+        has_fallen = bool(rows.get(name, {}).get("falls"))
+        found = self._found(rows, name, *([] if has_fallen else ["mean"]))
         if found["mean"] is None:
             who = "all" if found["falls"] == found["n"] else found["falls"]
             return f"{who} fell (n {found['n']})"
@@ -81,9 +84,9 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table of the documentation: the titles of its columns, and its lines."""
+    """A table of the documentation."""
 
-    head: tuple[str, ...]
+    head: tuple[str, ...]  #: titles of its columns
     lines: tuple[Line, ...]
 
     @property
@@ -139,9 +142,7 @@ def run(
 
     Examples:
     python -m benchmarks evidence docs/evidence.md behaviour.json
-    python -m benchmarks evidence docs/evidence.md locomotion.json balance.json
     python -m benchmarks evidence docs/explanation/speed.md speed.json
-    python -m benchmarks evidence docs/evidence.md behaviour.json more.json
     python -m benchmarks evidence docs/evidence.md locomotion.json balance.json
                                   --plot docs/images/speeds.svg
     """
@@ -197,28 +198,35 @@ def save_speeds(rows: Mapping[str, Row], path: Path) -> Path:
     Raises:
         ConfigError: if none of the results is of a speed.
     """
-    panels = [
-        SpeedPanel(title, _lines(rows, metric), is_logarithmic)
-        for metric, title, is_logarithmic in PANELS
-    ]
-    if not any(panel.lines for panel in panels):
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=FIGURE_SIZE, layout="constrained")
+        for axes, (metric, title, scale) in zip(figure.subplots(1, 3), PANELS, strict=True):
+            for label, color, points in _lines(rows, metric):
+                speeds, means, worst = np.array(points, float).T  # None is nan
+                axes.vlines(speeds, means, worst, color=color, lw=1.2, alpha=0.6)
+                axes.plot(speeds, means, "o-", color=color, ms=3, lw=1.2, label=label)
+            axes.set(yscale=scale, xlabel="speed told, m/s")
+            axes.set_ylim(bottom=0.0 if scale == "linear" else None)
+            axes.set_xlim(left=0.0)
+            axes.grid(color=TRACK, lw=0.5)
+            axes.spines[["top", "right"]].set_visible(False)
+            axes.set_title(title, loc="left", size=8.0, color=INK)
+        handles, labels = figure.axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+    if not labels:
         raise ConfigError("the results have no speeds to draw: run `benchmarks locomotion` first")
-    return save_figure(speed_figure(panels), path)
+    return save_figure(figure, path)
 
 
-def _lines(rows: Mapping[str, Row], metric: str) -> list[SpeedLine]:
-    lines = []
+def _lines(rows: Mapping[str, Row], metric: str) -> Iterator[tuple[str, str, list]]:
+    """Label, colour and points of each line: speed, mean, worst."""
+    has_any = False
     for state, (label, color) in enumerate(STATES):
-        found = {
-            float(speed): row
-            for speed in SPEEDS
-            if (row := rows.get(f"{names_of(speed)[state]}.{metric}")) and row["mean"] is not None
-        }
-        if found:
-            means = np.array([row["mean"] for row in found.values()], float)
-            worst = np.array([row["worst"] for row in found.values()], float)  # None is nan
-            lines.append(SpeedLine(label, color, np.array([*found]), means, worst))
-    if metric == "mean" and lines:
-        speeds, errors = np.array([*PEER]), np.array([*PEER.values()])
-        lines.append(SpeedLine("closest peer, true state", MUTED, speeds, errors, errors))
-    return lines
+        found = [(speed, rows.get(f"{names_of(speed)[state]}.{metric}")) for speed in SPEEDS]
+        known = [(speed, row) for speed, row in found if row and row["mean"] is not None]
+        if known:
+            has_any = True
+            yield label, color, [(speed, row["mean"], row["worst"]) for speed, row in known]
+    if metric == "mean" and has_any:
+        points = [(speed, error, error) for speed, error in PEER.items()]
+        yield "closest peer, true state", MUTED, points

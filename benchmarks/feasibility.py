@@ -7,12 +7,14 @@ only, and of the test half no single motion is shown.
 """
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import cache, partial
 from typing import Annotated
 
 from benchmarks.command import Jobs, Output, Resume, Sensors, measure_all, positive
+from benchmarks.robots import checker
 from benchmarks.study import IDEAL, Results, Study, Task, TrialResult
+from benchmarks.validation_set import questions as exam
 from benchmarks.validation_set.drawing import TEST
 from benchmarks.validation_set.physics import (
     BORDER,
@@ -28,19 +30,11 @@ from benchmarks.validation_set.physics import (
     verdicts_of,
     write_borders,
 )
-from benchmarks.validation_set.questions import (
-    Question,
-    draw_name,
-    draws,
-    dynamic_questions,
-    questions,
-)
+from benchmarks.validation_set.questions import Question, draw_name, draws
 from benchmarks.validation_set.scores import HALVES, Case, render, scores, wrong_ones
 from controller.cli.common import ExitCode
 from controller.motion_measurement import FELL
 from controller.sweeps.trials import Trial
-from go2_wbc.robot.model import RobotModel
-from motions import FeasibilityChecker
 
 EXAM, DYNAMIC, REFUSED = "exam", "dynamic", "refused"
 THRESHOLD = 0.95  #: Least precision and recall of refusals and of passes, test half, strict outcome
@@ -84,52 +78,32 @@ def run(
         return _bisect(measure, motions, output, remake=remake)
     if remake:
         print("--remake is for --borders: every motion is played, none is stored", file=sys.stderr)
-    asked, study = QUESTIONS[rows](), study_of(rows).on(sensors)
+    asked, study = asked_of(rows), study_of(rows).on(sensors)
     seeds = [n for n, one in enumerate(asked) if half in (None, one.family.half)][:motions]
-    cases = _cases(asked, measure([(study, seed) for seed in seeds])[study.name])
-    judge = judged if rows == EXAM else judged_dynamic
-    is_ok, verdict = judge(cases, len(seeds))
+    found = measure([(study, seed) for seed in seeds])[study.name]
+    for seed in seeds:
+        if not found[seed].values:
+            print(f"{asked[seed].name}: no result, {found[seed].reason}", file=sys.stderr)
+    cases = [case_of(asked[seed], found[seed]) for seed in seeds if found[seed].values]
+    is_ok, verdict = (judged if rows == EXAM else judged_dynamic)(cases, len(seeds))
     values = {"passed": is_ok, "scores": {n: s.as_dict() for n, s in scores(cases).items()}}
-    wrong_lines = wrong_ones(cases) if wrong else []
-    if wrong:
-        values["wrong"] = wrong_lines
-    output.publish(values, "\n".join([render(cases), *wrong_lines, verdict]))
+    more = {"wrong": wrong_ones(cases)} if wrong else {}
+    output.publish(values | more, "\n".join([render(cases), *more.get("wrong", ()), verdict]))
     return ExitCode.OK if is_ok else ExitCode.FAILED
 
 
 @cache
-def exam() -> list[Question]:
-    """All motions of the exam, in their order."""
-    return questions(read_borders())
-
-
-@cache
-def dynamic() -> list[Question]:
-    """Dynamic motions only, those of the exam and more."""
-    return dynamic_questions(read_borders())
-
-
-QUESTIONS = {EXAM: exam, DYNAMIC: dynamic}
-
-
-@cache
-def _checker() -> FeasibilityChecker:
-    """Made once for all trials of a process."""
-    return FeasibilityChecker(RobotModel())
+def asked_of(rows: str) -> list[Question]:
+    """All motions of the exam, in their order; or dynamic ones only, those of the exam and more."""
+    return (exam.questions if rows == EXAM else exam.dynamic_questions)(read_borders())
 
 
 def ask(trial: Trial, found: TrialResult, of: str) -> None:
-    """Check a motion and see what physics does; reasons are kept as notes.
-
-    Args:
-        trial: its seed is the number of the motion.
-        found: what is filled.
-        of: the exam, or its dynamic motions and more.
-    """
-    question, checker = QUESTIONS[of]()[trial.seed], _checker()
-    plan = question.plan(checker.model)
-    report = checker.check(plan)
-    outcome = verdicts_of(play(plan, checker.model, question.draw, trial.sensors), plan)
+    """Check the motion of that number and see what physics does; reasons are kept as notes."""
+    question, model = asked_of(of)[trial.seed], checker().model
+    plan = question.plan(model)
+    report = checker().check(plan)
+    outcome = verdicts_of(play(plan, model, question.draw, trial.sensors), plan)
     refusal = tuple(dict.fromkeys(finding.check for finding in report.failures))
     reasons = {REFUSED: refusal, **{kind: outcome.by(kind) for kind in OUTCOMES}}
     found.values = {row: float(bool(reason)) for row, reason in reasons.items()}
@@ -148,14 +122,6 @@ def study_of(of: str) -> Study:
         partial(ask, of=of),
         prefix="",
     )
-
-
-def _cases(asked: Sequence[Question], found: Mapping[int, TrialResult]) -> list[Case]:
-    """What was found of these motions; what has no result is told."""
-    for seed, one in sorted(found.items()):
-        if not one.values:
-            print(f"{asked[seed].name}: no result, {one.reason}", file=sys.stderr)
-    return [case_of(asked[seed], one) for seed, one in sorted(found.items()) if one.values]
 
 
 def case_of(question: Question, one: TrialResult) -> Case:

@@ -42,17 +42,9 @@ PLACE_TOLERANCE = 30.0
 def measure_held(trial: Trial, found: TrialResult) -> None:
     """Give a high five with either paw; every value is the worse of both sides.
 
-    - on three legs: the longest time in which the raised foot touches nothing;
-    - held: the ticks of the 1.9 s in which the paw's lowest point in time is highest;
-    - paw height held 2 s: the least height of the foot's centre over the floor while held;
-    - CoM margin: least distance of MuJoCo's CoM, on the ground, to the edges of the triangle of
-      the contact points of the other three feet;
-    - least foot load: least normal force on any of these three;
-    - support slip: largest distance, at any time on three legs, that the material of a supporting
-      foot has slid at its contact point: the norm of its integrated tangential velocity. (The
-      foot's centre moves further, because round feet roll.);
-    - peak torque: largest |tau| / limit of any joint on three legs;
-    - joint distance: least distance of any joint to its limit, the tighter published one for hips.
+    On three legs is the longest time in which the raised foot touches nothing; held are the ticks
+    of the 1.9 s in which its lowest point in time is highest. Slip is of a foot's material at its
+    contact point (its centre moves further, because round feet roll), at any time on three legs.
     """
     sides: list[dict[str, float]] = []
     with TrialRobot(trial) as robot:
@@ -152,11 +144,8 @@ IMPACT_KINDS = (
 def measure_impacts(trial: Trial, found: TrialResult) -> None:
     """Slap and lean on the paw while it is held, left for even seeds and right for odd ones.
 
-    - directions survived: of six, along the axes of the robot's heading; the robot must not fall
-      until the high five is over, and must stand then. The call itself may say False, if the slap
-      took the paw below its height;
-    - paw off its place: distance, in the world, of the foot's centre 2 s after the end of the
-      force from where it was before; worst direction.
+    A direction is survived by a robot that does not fall until the high five is over, and stands
+    then. The call itself may say False, if the slap took the paw below its height.
     """
     for kind in IMPACT_KINDS:
         survived, off, said = (name for name, *_ in kind.rows)
@@ -205,25 +194,22 @@ def _hits(
     Puts into ``found`` how far [mm] the paw was off its place afterwards. A robot that has fallen,
     or whose paw is down, raises ``TrialFailed``.
     """
-    leg = SIDES[side]
-    while robot.plant.p_world_feet[leg, 2] <= RAISED:
+    leg, plant = SIDES[side], robot.plant
+    while plant.p_world_feet[leg, 2] <= RAISED:
         yield
-    start = robot.plant.time + SETTLE_TIME
+    start = plant.time + SETTLE_TIME
     for index, direction in enumerate(directions):
         begin = start + index * kind.cycle
-        yield from _until(robot, begin)
-        place = robot.plant.p_world_feet[leg]
+        while plant.time < begin:
+            yield
+        place = plant.p_world_feet[leg]
         robot.push(kind.force * np.array(DIRECTIONS[direction]), kind.duration, leg.foot)
-        yield from _until(robot, begin + kind.duration + RETURN_TIME)
-        paw, fall = robot.plant.p_world_feet[leg], robot.truth.fall()
+        while plant.time < begin + kind.duration + RETURN_TIME:
+            yield
+        paw, fall = plant.p_world_feet[leg], robot.truth.fall()
         if fall is not None or paw[2] < RAISED:
             raise TrialFailed(fall or f"the paw is at {paw[2]:.2f} m two seconds later")
         found[direction] = 1000.0 * float(np.linalg.norm(paw - place))
-
-
-def _until(robot: TrialRobot, time: float) -> Iterator[None]:
-    while robot.plant.time < time:
-        yield
 
 
 HELD = Study("high-five", {"high five, either side": HELD_ROWS}, measure_held, "five")

@@ -6,13 +6,12 @@ the conditions of ``benchmarks.locomotion``: is it done, and is it true when ``p
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.robots import UNTOLD, plant_of
-from benchmarks.study import IMU, Study, TrialResult
+from benchmarks.robots import UNTOLD, plan_of, plant_of
+from benchmarks.study import Study, TrialResult
 from controller.acceptance import END_HEADING, END_PLACE
 from controller.motion_measurement import MotionMeasurement, during_motion, measure_motion
 from controller.sweeps.trials import Trial, TrialRobot
@@ -23,7 +22,7 @@ from go2_wbc.reference import Anchor
 from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle
-from motions import compile_timeline, load_motion, motion_names
+from motions import motion_names
 
 FIRST_SEED = 14000  # Of the first trial on sensors that is judged
 DRIFT, TURN_DRIFT = 0.015, 0.02
@@ -77,12 +76,6 @@ def play_all(plant: Callable[[], MujocoPlant], look: Look) -> dict[str, str]:
     return lost
 
 
-@cache
-def plan_of(name: str) -> MotionPlan:
-    """The motion, compiled once for all trials of a process: it depends on nothing of theirs."""
-    return compile_timeline(load_motion(name), RobotModel())
-
-
 def measure(trial: Trial, found: TrialResult) -> None:
     """The largest of what was measured on the true state.
 
@@ -90,20 +83,16 @@ def measure(trial: Trial, found: TrialResult) -> None:
     after a touchdown to 0.1 s before a lift-off; of motions whose feet stay where they are, and of
     those that step or jump: on little friction a foot that lands fast slides for longer.
     """
-    values = {name: 0.0 for name, *_ in ROWS}
+    worst = TrialResult({name: 0.0 for name, *_ in ROWS})
 
     def look(_robot: TrialRobot, _name: str, plan: MotionPlan, run: MotionMeasurement) -> None:
-        slip = "slip" if plan.footsteps is None else "landed_slip"
-        for name, value in (
-            (slip, 1000.0 * run.slip),
-            ("torque", run.torque),
-            ("speed", run.speed),
-            ("tracking", 1000.0 * run.tracking),
-        ):
-            values[name] = max(values[name], value)
+        worst.worsen("slip" if plan.footsteps is None else "landed_slip", 1000.0 * run.slip)
+        worst.worsen("torque", run.torque)
+        worst.worsen("speed", run.speed)
+        worst.worsen("tracking", 1000.0 * run.tracking)
 
     lost = play_all(trial.plant, look)
-    found.values = values | {"done": 1.0 - len(lost) / len(motion_names())}
+    found.values = worst.values | {"done": 1.0 - len(lost) / len(motion_names())}
     if lost:
         found.failures["done"] = _listed(lost)
 
@@ -141,21 +130,21 @@ def measure_sensed(trial: Trial, found: TrialResult) -> None:
     True: of the motions of which ``play`` said True, those that leave the robot upright where they
     end, in truth, within what ``play`` allows itself plus the drift.
     """
-    values, false = {"place": 0.0, "turn": 0.0}, dict[str, str]()
+    worst, false = TrialResult({"place": 0.0, "turn": 0.0}), dict[str, str]()
 
     def look(robot: TrialRobot, name: str, plan: MotionPlan, run: MotionMeasurement) -> None:
         if not run.said:
             return
         end = ending(during_motion(robot.go2, robot.truth, name), plan)
-        values["place"] = max(values["place"], 1000.0 * end.off)
-        values["turn"] = max(values["turn"], math.degrees(end.turned))
+        worst.worsen("place", 1000.0 * end.off)
+        worst.worsen("turn", math.degrees(end.turned))
         if run.fall is not None or not end.is_as_said:
             false[name] = run.fall or f"{1000.0 * end.off:.0f} mm off"
 
     lost = play_all(lambda: plant_of(trial, FIRST_SEED, UNTOLD), look)
     said = len(motion_names()) - len(lost.keys() - false.keys())
     done, true = 1.0 - len(lost) / len(motion_names()), 1.0 - len(false) / max(said, 1)
-    found.values = {**values, "done": done, "true": true}
+    found.values = worst.values | {"done": done, "true": true}
     notes = {"done": _listed(lost), "true": _listed(false)}
     found.notes = {name: words for name, words in notes.items() if words}
 
@@ -165,11 +154,5 @@ def _listed(reasons: dict[str, str]) -> str:
 
 
 ON_TRUTH = Study("library", {EVERY: ROWS}, measure)
-ON_SENSORS = Study(
-    "sensed-library",
-    {f"sensors: {EVERY}": SENSED_ROWS},
-    measure_sensed,
-    prefix="sensed_library",
-    group="sensors",
-    sensors=IMU,
-)
+_SENSED = Study("library", {EVERY: SENSED_ROWS}, measure_sensed).sensed("sensors")
+ON_SENSORS = replace(_SENSED, prefix="sensed_library")

@@ -4,10 +4,6 @@ Each row of ``walks`` and ``pushes`` twice: by the ``policy`` that comes with th
 the ``trot`` of the whole-body controller, under the same conditions as in ``locomotion`` and
 ``balance``: friction 0.6 to 1.0, masses within 10 %. Seeds of the training are other ones.
 
-- speeds: 20 s at 0.3 to 0.8 m/s;
-- friction-0.3: the same at 0.5 m/s on a floor of that friction;
-- pushes: as in ``balance``, 16 phases each;
-- hand-over: from the trot to the policy and back, 20 phases each, at 0.5 m/s;
 - wrong: sidecars in which one thing is wrong; named is who finds which, and puts it right. The
   wrong one's factor is drawn from 2 to 5, or their inverse; or signs, or the order of the joints;
 - right: the policy laid out in another order, with other signs and scales; accused is a mistake.
@@ -18,10 +14,10 @@ from functools import cache, partial
 
 import numpy as np
 
-from benchmarks.balance import PHASES, TROT_PUSHES
+from benchmarks.balance import PHASES, TROT_PUSHES, share_of_phases
 from benchmarks.command import Benchmark
 from benchmarks.locomotion import FIRST_SEED, START_TIME, WINDOW, Run, measured
-from benchmarks.robots import PUSH_TIME, UNTOLD, heading_force, plant_of
+from benchmarks.robots import PUSH_TIME, UNTOLD, plant_of
 from benchmarks.study import Study, TrialResult
 from controller.policies import TROT, Policy, probe
 from controller.policies.probing import Change, changes, scaled
@@ -33,6 +29,7 @@ from go2_wbc.plant import MujocoPlant
 WALKS = ("policy", "trot")
 SPEEDS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)  # m/s
 SPEED, SLIPPERY = 0.5, 0.3  # m/s, friction
+ON_ICE = f"{SPEED:g} m/s on {SLIPPERY:g}, 20 s"
 HAND_OVERS = 20
 STRIDE = GAITS["trot"].period
 KINDS = ("order", "signs", "scale", "gain")
@@ -73,20 +70,19 @@ def measure_walk(
 
 def measure_pushes(trial: Trial, found: TrialResult, walk: str, push: str) -> None:
     """Push at every phase of the stride; the share of phases that are survived."""
-    angle, impulse = TROT_PUSHES[push]
-    survived = 0
-    for phase in range(PHASES):
-        side = 1.0 if phase % 2 or push != "lateral" else -1.0
-        with TrialRobot(plant_of(trial, FIRST_SEED, UNTOLD)) as robot:
-            set_off(robot, walk, SPEED)
-            try:
-                robot.wait(2.0 + phase * STRIDE / PHASES)
-                robot.push(heading_force(side * angle, impulse), PUSH_TIME)
-                robot.wait(2.0)
-                survived += 1
-            except TrialFailed as failed:
-                found.notes[""] = str(failed)
-    found.values[""] = survived / PHASES
+
+    def goes_on(robot: TrialRobot, phase: int, force: np.ndarray) -> bool:
+        set_off(robot, walk, SPEED)
+        try:
+            robot.wait(2.0 + phase * STRIDE / PHASES)
+            robot.push(force, PUSH_TIME)
+            robot.wait(2.0)
+        except TrialFailed as failed:
+            found.notes[""] = str(failed)
+            return False
+        return True
+
+    found.values[""] = share_of_phases(trial, FIRST_SEED, push, goes_on)
 
 
 def measure_hand_over(trial: Trial, found: TrialResult) -> None:
@@ -207,51 +203,27 @@ ON_TRUTH = (
         for speed in SPEEDS
         for walk in WALKS
     ),
-    *(
-        _walk(
-            walk,
-            "slippery",
-            f"{SPEED:g} m/s on {SLIPPERY:g}, 20 s",
-            "%",
-            speed=SPEED,
-            friction=SLIPPERY,
-        )
-        for walk in WALKS
-    ),
+    *(_walk(walk, "slippery", ON_ICE, "%", speed=SPEED, friction=SLIPPERY) for walk in WALKS),
     *(_pushes(walk, push) for push in TROT_PUSHES for walk in WALKS),
     Study(
         "hand-over",
         {f"trot and policy, {SPEED:g} m/s": [("", "handed over without a fall", ">= 1")]},
         measure_hand_over,
-        group="",
     ),
 )
-PROBED = (
-    Study(
-        "wrong",
-        {"probe": [("", "what is wrong named, and put right", ">= 1")]},
-        measure_wrong,
-        seed_factor=4,
-        group="probe",
-        sensors=None,
-    ),
-    Study(
-        "right",
-        {"probe": [("", "right ones left alone", ">= 1")]},
-        measure_right,
-        group="probe",
-        sensors=None,
-    ),
+PROBED = tuple(
+    Study(name, {"probe": [("", what, ">= 1")]}, measure, None, None, factor, "probe", None)
+    for name, what, measure, factor in (
+        ("wrong", "what is wrong named, and put right", measure_wrong, 4),
+        ("right", "right ones left alone", measure_right, 1),
+    )
 )
 STUDIES = (*ON_TRUTH, *(study.sensed("sensors") for study in ON_TRUTH), *PROBED)
-"""In the order of the report."""
 
-
-BENCHMARK = Benchmark(
+run = Benchmark(
     "policies",
     "The cloned trot beside the one of the whole-body controller, and the probe of sidecars.",
     STUDIES,
     takes="half an hour on two cores",
     examples=("--rows walks", "--rows probe --seeds 10"),
-)
-run = BENCHMARK.run
+).run

@@ -13,10 +13,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
+import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
 
 from benchmarks.command import Jobs, Output, RowsFile, positive, run_sweep
-from benchmarks.figures import reliability_figure
 from benchmarks.probability_fit import Calibration, Sample, calibration, fit_model
 from benchmarks.probability_runs import DRAWN, motion_and_world, seeds, trial
 from benchmarks.validation_set.drawing import TEST, TRAIN
@@ -25,7 +26,7 @@ from controller.sweeps.summary import rate_interval
 from controller.sweeps.sweep_file import Row
 from go2_wbc.files import write_atomically
 from motions.feasibility.report import FILE, ProbabilityModel, fitted
-from viz.style import save_figure
+from viz.style import ACCENT, INK, MUTED, STYLE, TRACK, save_figure
 
 FITTED = (TRAIN, DRAWN)  # What the model may be fitted to
 ERROR, BRIER_SHARE = 0.05, 0.5
@@ -33,6 +34,7 @@ ERROR, BRIER_SHARE = 0.05, 0.5
 COLUMNS = ("seed", "motion", "half", "stratum", "friction", "payload", "refused", "done", "fell")
 """Of a run, besides the chance that was stated."""
 DIGITS = 3
+FIGURE_SIZE = (4.6, 4.0)  # [inch]
 
 
 def run(
@@ -70,7 +72,8 @@ def run(
         write_atomically(data, csv_of(model, found))
     if plot:
         save_reliability(judged, plot)
-    is_ok = is_calibrated(judged) and not falls and not result.failures
+    is_ok = judged.error <= ERROR and judged.brier <= BRIER_SHARE * judged.brier_of_base_rate
+    is_ok = is_ok and not falls and not result.failures
     counts = len(falls), sum(not row["refused"] for row in found)
     about = {"passed_that_fell": counts, "lost": result.failures}
     values = {"passed": is_ok, **asdict(judged), **about}
@@ -113,11 +116,6 @@ def judge(model: ProbabilityModel, rows: Sequence[Row]) -> Calibration:
     return calibration(chances, done, [sample.motion for sample in samples])
 
 
-def is_calibrated(judged: Calibration) -> bool:
-    """Whether both bars are met."""
-    return judged.error <= ERROR and judged.brier <= BRIER_SHARE * judged.brier_of_base_rate
-
-
 def passed_that_fell(rows: Sequence[Row]) -> list[Row]:
     """The motions that the check passed in their world and that fell there."""
     return [row for row in rows if row["fell"] and not row["refused"]]
@@ -133,12 +131,11 @@ def render(judged: Calibration, rows: Sequence[Row], lost: dict[int, str]) -> st
     low, high = judged.error_interval
     fallen = passed_that_fell(rows)
     of = sum(not row["refused"] for row in rows)
+    error, rate = f"{judged.error:.3f} (95 %: {low:.3f} to {high:.3f})", judged.brier_of_base_rate
     lines += [
         "-" * 80,
-        f"expected calibration error {judged.error:.3f} (95 %: {low:.3f} to {high:.3f}), "
-        f"bar {ERROR:g}",
-        f"Brier score {judged.brier:.3f}, of the base rate {judged.brier_of_base_rate:.3f}, "
-        f"bar half of it",
+        f"expected calibration error {error}, bar {ERROR:g}",
+        f"Brier score {judged.brier:.3f}, of the base rate {rate:.3f}, bar half of it",
         f"motions that passed in their world and fell there: {len(fallen)} of {of}",
         *(f"seed {row['seed']}: {motion_and_world(row)}" for row in fallen),
         *(f"seed {seed} gave no row: {why:.55}" for seed, why in lost.items()),
@@ -151,12 +148,10 @@ def csv_of(model: ProbabilityModel, rows: Sequence[Row]) -> bytes:
     text = io.StringIO(newline="")
     table = csv.writer(text, lineterminator="\n")
     table.writerow((*COLUMNS, "chance"))
-    for row in rows:
-        chance = model.probability(json.loads(str(row["margins"])))
-        values = (row[name] for name in COLUMNS)
+    for row, sample in zip(rows, _samples(rows), strict=True):
+        values = (*(row[name] for name in COLUMNS), model.probability(sample.margins))
         values = (int(v) if isinstance(v, bool) else v for v in values)
-        values = (round(v, DIGITS) if isinstance(v, float) else v for v in values)
-        table.writerow([*values, round(chance, DIGITS)])
+        table.writerow(round(v, DIGITS) if isinstance(v, float) else v for v in values)
     return text.getvalue().encode()
 
 
@@ -166,12 +161,21 @@ def save_reliability(judged: Calibration, path: Path) -> Path:
     The intervals (Clopper-Pearson, 95 %) take runs for independent, which those of one motion
     are not.
     """
-    stated, done, counts = (np.array(column) for column in zip(*judged.bins, strict=True))
-    intervals = [rate_interval(round(s * n), n) for _, s, n in judged.bins]
     low, high = judged.error_interval
-    title = (
-        f"{counts.sum()} runs of the test half; expected error {judged.error:.3f} "
-        f"({low:.3f} to {high:.3f})"
-    )
-    figure = reliability_figure(stated, done, counts * 1.0, np.array(intervals), title=title)
+    title = f"{sum(n for *_, n in judged.bins)} runs of the test half; expected error "
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=FIGURE_SIZE, layout="constrained")
+        axes = figure.add_subplot()
+        axes.plot([0.0, 1.0], [0.0, 1.0], color=TRACK, lw=1.2)
+        for stated, done, n in judged.bins:
+            axes.vlines(stated, *rate_interval(round(done * n), n), color=ACCENT, lw=1.6)
+            axes.plot(stated, done, "o", color=INK, ms=4)
+            place = {"xytext": (5, -8), "textcoords": "offset points"}
+            axes.annotate(f"{n}", (stated, done), color=MUTED, **place)
+        axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
+        axes.set(xlabel="chance stated", ylabel="share done", aspect="equal")
+        axes.set_xticks(np.linspace(0.0, 1.0, 11), minor=True)
+        axes.spines[["top", "right"]].set_visible(False)
+        said = f"{title}{judged.error:.3f} ({low:.3f} to {high:.3f})"
+        axes.set_title(said, loc="left", size=8.0, color=INK)
     return save_figure(figure, path)

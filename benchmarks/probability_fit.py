@@ -126,6 +126,10 @@ def _loss(
     return 0.5 * float(away @ away) - float(likelihood), gradient + away / spreads
 
 
+Bins = tuple[tuple[float, float, int], ...]
+"""Of each bin that holds any: mean chance, share done, runs."""
+
+
 @dataclass(frozen=True, slots=True)
 class Calibration:
     """How well chances foretell outcomes."""
@@ -134,8 +138,7 @@ class Calibration:
     error_interval: tuple[float, float]  #: of 95 %, by resampling motions (bootstrap)
     brier: float  #: mean squared difference of chance and outcome (Brier, 1950)
     brier_of_base_rate: float  #: the same of one who always says the share of motions done
-    bins: tuple[tuple[float, float, int], ...]
-    """Of each bin that holds any: mean chance, share done, runs."""
+    bins: Bins
 
 
 def calibration(
@@ -155,18 +158,12 @@ def calibration(
     return Calibration(_error(bins), (low, high), brier, rate * (1.0 - rate), bins)
 
 
-def _bins(
-    chances: Float[np.ndarray, " n"], done: Bool[np.ndarray, " n"]
-) -> tuple[tuple[float, float, int], ...]:
+def _bins(chances: Float[np.ndarray, " n"], done: Bool[np.ndarray, " n"]) -> Bins:
     number: Int[np.ndarray, " n"] = np.minimum((chances * BINS).astype(int), BINS - 1)
-    groups = (number == index for index in range(BINS))
-    return tuple(
-        (float(chances[own].mean()), float(done[own].mean()), int(own.sum()))
-        for own in groups
-        if own.any()
-    )
+    groups = (number == index for index in np.unique(number))
+    return tuple((float(chances[g].mean()), float(done[g].mean()), int(g.sum())) for g in groups)
 
 
-def _error(bins: tuple[tuple[float, float, int], ...]) -> float:
+def _error(bins: Bins) -> float:
     total = sum(count for *_, count in bins)
     return sum(count * abs(chance - share) for chance, share, count in bins) / total

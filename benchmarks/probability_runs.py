@@ -14,19 +14,19 @@ from operator import itemgetter
 
 import numpy as np
 
+from benchmarks.robots import checker
 from benchmarks.validation_set.drawing import TEST, TRAIN
-from benchmarks.validation_set.physics import play, read_borders
+from benchmarks.validation_set.physics import get_ready, play, read_borders
 from benchmarks.validation_set.questions import IMPOSSIBLE, Question, questions
 from benchmarks.validation_set.random_timelines import RandomTimeline, random_timelines
 from controller.motion_measurement import FELL, failures_of, measure_motion
 from controller.sweeps.sweep_file import Row
 from controller.sweeps.trials import TrialFailed, TrialRobot
 from go2_wbc.errors import Go2WbcError
-from go2_wbc.motion_plan import MotionPlan, Posture
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.plant import plant_in_world
-from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
-from motions import FeasibilityChecker, FeasibilityReport
+from motions import FeasibilityChecker
 
 DRAWN, SENTENCES = "drawn", 500  #: What random sentences are, besides the two halves, and how many
 WORLDS = {TRAIN: 2, TEST: 5}
@@ -42,29 +42,23 @@ NOT_READY = "not ready"  #: What went wrong with a robot that did not get as far
 
 def trial(seed: int) -> dict[str, object]:
     """The row of a seed: motion, verdict, margins (JSON) and outcome by the strict definition."""
+    model = checker().model
     if seed >= len(runs()):  # a sentence
-        sentence, checker = drawn()[seed - len(runs())], FeasibilityChecker(model())
-        plan = checker.plan(sentence.line, check=False)
-        harm = failures_of(play(plan, model(), sentence.number), plan)
-        kind = (f"sentence {sentence.number}", DRAWN, DRAWN)
-        return _row(sentence.name, kind, checker.world, checker.check(plan), harm)
-    question, plan = _asked(runs()[seed])
-    world = world_of(seed)
-    report = FeasibilityChecker(model(), world=world).check(plan)
-    kind = (question.family.name, question.family.half, question.stratum)
-    return _row(question.name, kind, world, report, played(plan, world, seed))
-
-
-def _row(
-    motion: str,
-    kind: tuple[str, str, str],
-    world: World,
-    report: FeasibilityReport,
-    harm: tuple[str, ...],
-) -> dict[str, object]:
+        asked, judge = drawn()[seed - len(runs())], checker()
+        family, half, stratum = f"sentence {asked.number}", DRAWN, DRAWN
+        plan, world = judge.plan(asked.line, check=False), judge.world
+        harm = failures_of(play(plan, model, asked.number), plan)
+    else:
+        asked, plan = _asked(runs()[seed])
+        family, half, stratum = asked.family.name, asked.family.half, asked.stratum
+        world = world_of(seed)
+        judge, harm = FeasibilityChecker(model, world=world), played(plan, world, seed)
+    report = judge.check(plan)
     return {
-        "motion": motion,
-        **dict(zip(("family", "half", "stratum"), kind, strict=True)),
+        "motion": asked.name,
+        "family": family,
+        "half": half,
+        "stratum": stratum,
         "friction": world.friction,
         "payload": world.payload,
         "refused": not report.ok,
@@ -99,25 +93,16 @@ def played(plan: MotionPlan, world: World, seed: int) -> tuple[str, ...]:
     """What went wrong, strictly, in a sample of ``world``; nothing if it was done."""
     with TrialRobot(plant_in_world(world, seed=seed)) as robot:
         try:
-            robot.require(robot.go2.stand())
-            if plan.entry is Posture.SIT:
-                robot.require(robot.go2.sit())
+            get_ready(robot, plan)
         except (TrialFailed, Go2WbcError):
             return (NOT_READY,)
-        measured = measure_motion(robot.go2, robot.truth, plan, model())
-    return failures_of(measured, plan)
-
-
-@lru_cache(maxsize=1)
-def model() -> RobotModel:
-    """The robot, read once in each process."""
-    return RobotModel()
+        return failures_of(measure_motion(robot.go2, robot.truth, plan, checker().model), plan)
 
 
 @lru_cache(maxsize=2)
 def _asked(number: int) -> tuple[Question, MotionPlan]:
     question = exam()[number]
-    return question, question.plan(model())
+    return question, question.plan(checker().model)
 
 
 @lru_cache(maxsize=1)

@@ -5,7 +5,7 @@ joints; random commands are in ``balance``. The limits of ``wbc.solvers`` were c
 layouts 0 to 5 and six pushes; no seed of theirs is judged here.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from benchmarks.command import Benchmark
-from benchmarks.robots import PUSH_TIME, force_of
+from benchmarks.robots import PUSH_TIME, heading_force
 from benchmarks.study import Study, TrialResult
 from controller.modes import Mode
 from controller.sweeps.trials import Trial, TrialRobot
@@ -23,7 +23,6 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.plant.terrain import Boxes
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import yaw_rotation
 
 FIRST_LAYOUT = 20  # Seed of the first layout of boxes that is judged
 BOX_HEIGHT = 0.08  # m
@@ -36,12 +35,10 @@ AFTERMATH = 1.0
 """Time [s] for which a robot that gave up is watched, to see whether it reports a fall."""
 UPRIGHT = np.radians(30.0)
 """Tilt below which a robot that was damped had no reason to be: the limit of ``SafetyConfig``."""
-Course = Callable[[TrialRobot, np.random.Generator], Iterator[float]]
-"""Commands and pushes of a trial; gives the time [s] until it wants to go on."""
 
 
-def over_boxes(robot: TrialRobot, rng: np.random.Generator) -> Iterator[float]:
-    """Eight seconds at 1.0 m/s over boxes that the robot does not know about."""
+def ahead(robot: TrialRobot) -> Iterator[float]:
+    """A course: commands and pushes; gives the time [s] until it wants to go on."""
     robot.go2.move(1.0)
     yield 8.0
 
@@ -55,7 +52,7 @@ def pushed(
     for _ in range(3):
         yield float(rng.uniform(0.0, 0.36))
         angle = rng.uniform(-np.pi, np.pi)
-        robot.push(yaw_rotation(angle) @ force_of(impulse, "forward"), PUSH_TIME)
+        robot.push(heading_force(angle, impulse), PUSH_TIME)
         yield 2.5
 
 
@@ -75,7 +72,6 @@ ROWS = (
     ("unreported", "falls not reported", "<= 0"),
     ("falls", "falls", ""),
 )
-"""What is counted in every trial."""
 
 
 def watch(robot: TrialRobot, course: Iterator[float], found: TrialResult) -> None:
@@ -117,36 +113,31 @@ def is_up(robot: TrialRobot) -> bool:
 
 
 def measure_boxes(trial: Trial, found: TrialResult) -> None:
-    """8 cm boxes at 1.0 m/s."""
+    """Eight seconds at 1.0 m/s over boxes that the robot does not know about."""
     layout = FIRST_LAYOUT + trial.seed
     terrain = Boxes(height=BOX_HEIGHT, seed=layout)
-    plant = MujocoPlant(terrain=terrain, seed=layout, sensors=trial.sensors)
-    _measure(TrialRobot(plant), over_boxes, layout, found)
+    with TrialRobot(MujocoPlant(terrain=terrain, seed=layout, sensors=trial.sensors)) as robot:
+        watch(robot, ahead(robot), found)
 
 
-def measure_pushes(trial: Trial, found: TrialResult) -> None:
-    """30 N s while trotting at 0.5 m/s."""
+def measure_pushes(
+    trial: Trial, found: TrialResult, impulse: float, speed: float, config: Config | None = None
+) -> None:
+    """Trot, and be pushed by ``impulse`` [N s]."""
     seed = FIRST_PUSH + trial.seed
-    robot = TrialRobot(replace(trial, seed=seed, has_nominal_friction=True))
-    _measure(robot, partial(pushed, impulse=IMPULSE, speed=0.5), seed, found)
+    trial = replace(trial, seed=seed, has_nominal_friction=True)
+    with TrialRobot(trial, config) as robot:
+        watch(robot, pushed(robot, np.random.default_rng(seed), impulse, speed), found)
+        if config is not None:
+            distance = calf_distance(robot.truth.recording())
+            found.values["near"] = 100.0 * float((distance < AT_STOP).mean())
 
 
 def measure_stops(trial: Trial, found: TrialResult) -> None:
     """Trot so high that the calves come to their stops, or (odd seeds) so low; and be pushed."""
-    seed = FIRST_PUSH + trial.seed
     height = (GREATEST_HEIGHT, LEAST_HEIGHT)[trial.seed % 2]
     config = Config(locomotion=LocomotionConfig(height=height))
-    robot = TrialRobot(replace(trial, seed=seed, has_nominal_friction=True), config)
-    course = partial(pushed, impulse=IMPULSE_AT_STOPS, speed=0.8)
-    with robot:
-        watch(robot, course(robot, np.random.default_rng(seed)), found)
-        distance = calf_distance(robot.truth.recording())
-    found.values["near"] = 100.0 * float((distance < AT_STOP).mean())
-
-
-def _measure(robot: TrialRobot, course: Course, seed: int, found: TrialResult) -> None:
-    with robot:
-        watch(robot, course(robot, np.random.default_rng(seed)), found)
+    measure_pushes(trial, found, IMPULSE_AT_STOPS, 0.8, config)
 
 
 def calf_distance(recorded: TruthRecording) -> Float[np.ndarray, " n"]:
@@ -157,15 +148,13 @@ def calf_distance(recorded: TruthRecording) -> Float[np.ndarray, " n"]:
 
 
 NEAR = ("near", "ticks, a calf at its stop", "%")
+PUSHES = partial(measure_pushes, impulse=IMPULSE, speed=0.5)
 STUDIES = (
     Study("boxes", {"8 cm boxes, trot 1.0 m/s, 8 s": ROWS}, measure_boxes),
-    Study("pushes", {"trot 0.5 m/s, three pushes of 30 N s": ROWS}, measure_pushes),
+    Study("pushes", {"trot 0.5 m/s, three pushes of 30 N s": ROWS}, PUSHES),
     Study("stops", {"calves at their stops, pushes of 20 N s": (*ROWS, NEAR)}, measure_stops),
 )
-"""In the order of the report."""
-
-
-BENCHMARK = Benchmark(
+run = Benchmark(
     "qp_infeasibility",
     "Trots on which the QP contradicts itself: is there always an answer, is the\n"
     "robot never damped while upright, how often do constraints give way too far.",
@@ -173,5 +162,4 @@ BENCHMARK = Benchmark(
     takes="minutes on two cores",
     examples=("--rows boxes pushes --json",),
     sensors=True,
-)
-run = BENCHMARK.run
+).run

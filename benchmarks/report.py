@@ -43,20 +43,15 @@ class MetricResult:
             return None
         if self.mean is None or self.falls or not self.n:
             return False
-        return self.metric.direction.meets(self.mean, self.metric.threshold)
+        off = self.mean - self.metric.threshold
+        return off <= 0.0 if self.metric.direction == "<=" else off >= 0.0
 
     def as_dict(self) -> dict[str, object]:
         """Plain values for JSON; what is not finite or was not measured is None."""
+        names = ("n", "mean", "sd", "worst", "worst_seed", "falls", "passed")
         return {
             **asdict(self.metric),
-            "direction": self.metric.direction.value,
-            "n": self.n,
-            "mean": finite(self.mean),
-            "sd": finite(self.sd),
-            "worst": finite(self.worst),
-            "worst_seed": self.worst_seed,
-            "falls": self.falls,
-            "passed": self.passed,
+            **{name: finite(getattr(self, name)) for name in names},
             "values": {str(seed): finite(value) for seed, value in self.values.items()},
             "failures": {str(seed): reason for seed, reason in self.failures.items()},
         }
@@ -80,9 +75,10 @@ class Report:
 
 def summarise(scenarios: Sequence[Study], results: Results) -> Report:
     """The report of ``results``."""
-    return Report(
-        tuple(summarise_metric(m, results.get(s.name, {})) for s in scenarios for m in s.metrics)
-    )
+    pairs = [
+        (metric, results.get(study.name, {})) for study in scenarios for metric in study.metrics
+    ]
+    return Report(tuple(summarise_metric(*pair) for pair in pairs))
 
 
 def summarise_metric(metric: Metric, trials: Mapping[int, TrialResult]) -> MetricResult:
@@ -94,7 +90,8 @@ def summarise_metric(metric: Metric, trials: Mapping[int, TrialResult]) -> Metri
     failures |= {s: f"{v} was measured" for s, v in found.items() if math.isnan(v)}
     values = {s: v for s, v in found.items() if not math.isnan(v)}
     missing = [s for s in ordered if s not in values]
-    worst, numbers = metric.direction.worst(values) if values else None, list(values.values())
+    pick, numbers = max if metric.direction == "<=" else min, list(values.values())
+    worst = pick(values, key=values.__getitem__, default=None)
     return MetricResult(
         metric=metric,
         n=len(ordered),
@@ -109,8 +106,7 @@ def summarise_metric(metric: Metric, trials: Mapping[int, TrialResult]) -> Metri
 
 def render(report: Report) -> str:
     """The table, with the reasons of failed seeds below, and the verdict."""
-    names = ("threshold", "n", "mean", "sd", "worst", "seed")
-    titles = {name: name for name in names}
+    titles = {name: name for name in ("threshold", "n", "mean", "sd", "worst", "seed")}
     head = _LINE.format(quantity="", **titles, falls="fell", verdict="")
     lines = [head.rstrip(), "-" * WIDTH]
     for item, group in groupby(report.rows, key=lambda result: result.metric.item):
@@ -129,11 +125,10 @@ def threshold_text(metric: Metric) -> str:
     """The threshold with its unit, as ``<= 1 %``; a dash for a metric that only informs."""
     if metric.threshold is None:
         return f"- {metric.unit}".rstrip()
-    return f"{metric.direction.value} {metric.threshold:g} {metric.unit}".rstrip()
+    return f"{metric.direction} {metric.threshold:g} {metric.unit}".rstrip()
 
 
 def _line(result: MetricResult) -> str:
-    verdict = {True: " ok", False: " NO", None: ""}[result.passed]
     return _LINE.format(
         quantity=result.metric.quantity,
         threshold=threshold_text(result.metric),
@@ -143,7 +138,7 @@ def _line(result: MetricResult) -> str:
         worst=_number(result.worst) if result.worst is not None or not result.falls else "fell",
         seed="-" if result.worst_seed is None else result.worst_seed,
         falls=result.falls,
-        verdict=verdict,
+        verdict={True: " ok", False: " NO", None: ""}[result.passed],
     ).rstrip()
 
 

@@ -20,6 +20,7 @@ from go2_wbc.robot.description import find_description, find_profile
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from go2_wbc.robot.state import RobotState
+from motions import CompiledPlan, FeasibilityChecker, compile_timeline, load_motion
 
 FRICTION_RANGE, MASS_RANGE, UNTOLD = (0.6, 1.0), (0.95, 1.05), (0.9, 1.1)
 """Friction, and factor on every mass and inertia of the robot, twice; the controller is not told.
@@ -53,6 +54,18 @@ def plant_of(
         initial_yaw=float(yaw),
         initial_joint_noise=JOINT_NOISE,
     )
+
+
+@cache
+def checker() -> FeasibilityChecker:
+    """Made once in each process."""
+    return FeasibilityChecker(RobotModel())
+
+
+@cache
+def plan_of(name: str) -> CompiledPlan:
+    """A motion of the library, compiled once in each process."""
+    return compile_timeline(load_motion(name), RobotModel())
 
 
 def gym_go2() -> Path | None:
@@ -89,11 +102,6 @@ def menagerie_go2() -> Path:
     return file
 
 
-def force_of(impulse: float, direction: str) -> Float[np.ndarray, "3"]:
-    """Force [N] that gives ``impulse`` [N s] in ``PUSH_TIME``."""
-    return np.array(DIRECTIONS[direction]) * impulse / PUSH_TIME
-
-
 def heading_force(angle: float, impulse: float) -> Float[np.ndarray, "3"]:
     """Force [N] that gives ``impulse`` [N s] at ``angle`` [rad] from ahead to the left."""
     return impulse / PUSH_TIME * np.array([math.cos(angle), math.sin(angle), 0.0])
@@ -123,9 +131,6 @@ def standing_failure(robot: TrialRobot) -> str | None:
 def com_height(window: TruthRecording, model: RobotModel | None = None) -> float:
     """Mean height [m] of the CoM as the model, by default a Go2's, has it, without a payload."""
     model, q, v = model or RobotModel(), window.q[::SAMPLING], window.v[::SAMPLING]
-    heights = [model.snapshot(_state(*pair)).p_world_com[2] for pair in zip(q, v, strict=True)]
-    return float(np.mean(heights))
-
-
-def _state(q: Float[np.ndarray, "19"], v: Float[np.ndarray, "18"]) -> RobotState:
-    return RobotState(0.0, q, v, np.zeros(12), np.zeros(4), np.ones(4, dtype=bool))
+    rest = np.zeros(12), np.zeros(4), np.ones(4, dtype=bool)
+    states = (RobotState(0.0, *pair, *rest) for pair in zip(q, v, strict=True))
+    return float(np.mean([model.snapshot(state).p_world_com[2] for state in states]))

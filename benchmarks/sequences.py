@@ -17,8 +17,8 @@ import math
 import threading
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from benchmarks.command import Benchmark
 from benchmarks.demo_sequence import REAR_END, SIT_PITCH, SIT_REAR_HEIGHT
 from benchmarks.disturbed import Watch
 from benchmarks.high_five import longest_run
+from benchmarks.robots import plan_of
 from benchmarks.study import IMU, Study, TrialResult
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
@@ -41,7 +42,6 @@ from go2_wbc.plant.terrain import Boxes, Slope
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
-from motions import CompiledPlan, compile_timeline, load_motion
 
 FOOT_RADIUS, STAND_HEIGHT = find_profile().foot_radius, find_profile().stand_height
 FIRST_SEED = 9100  #: Seed of the first trial that is judged
@@ -79,6 +79,7 @@ WRONG: tuple[tuple[str, tuple[Any, ...]], ...] = (
     ("wait", (-1.0,)),
 )
 """Calls whose arguments are wrong."""
+DRAWN_GAITS = (*GAITS, "trot", "trot", "auto")
 STEEP_GAITS = ("pace", "bound")
 """Both feet of a side, or of an end, stand beside the CoM: that asks for more friction than 0.3."""
 FREE = ("recover", "wait", "damp", "stop")  #: What a robot that has fallen may be told
@@ -93,36 +94,25 @@ class World:
     room: float
     """Share by which True may be worse, and False must be better, than the limit that the
     documentation names."""
-    settings: Mapping[str, Any]
-    """Of ``MujocoPlant``; on every other seed the ``others``, if there are any."""
-    others: Mapping[str, Any] = field(default_factory=dict)
-    gaits: tuple[str, ...] = (*GAITS, "trot", "trot", "auto")  #: that are drawn
+    settings: tuple[Mapping[str, Any], ...]  #: of ``MujocoPlant``, from seed to seed in turn
+    gaits: tuple[str, ...] = DRAWN_GAITS  #: that are drawn
 
     def plant(self, seed: int) -> MujocoPlant:
         """The simulated robot of a trial."""
-        settings = dict(self.others if self.others and seed % 2 else self.settings)
+        settings = dict(self.settings[seed % len(self.settings)])
         if isinstance(boxes := settings.get("terrain"), Boxes):
             settings["terrain"] = replace(boxes, seed=seed)
         return MujocoPlant(**settings, seed=seed, initial_joint_noise=JOINT_NOISE)
 
 
+_SLIPPERY, _LATE = {"friction": 0.3, "payload": 3.0}, {"delay": 0.008, "sensors": IMU}
+_UNEVEN = {"terrain": Boxes(count=60)}, {"terrain": Slope(math.radians(8.0))}
+_FLAT_GAITS = tuple(name for name in DRAWN_GAITS if name not in STEEP_GAITS)
 WORLDS = (
-    World("level", "friction 0.6", 0.05, {"friction": 0.6}),
-    World(
-        "slippery",
-        "friction 0.3, 3 kg",
-        0.05,
-        {"friction": 0.3, "payload": 3.0},
-        gaits=tuple(name for name in (*GAITS, "trot", "trot", "auto") if name not in STEEP_GAITS),
-    ),
-    World(
-        "uneven",
-        "boxes of 6 cm, or 8 deg",
-        0.25,
-        {"terrain": Boxes(count=60)},
-        {"terrain": Slope(math.radians(8.0))},
-    ),
-    World("late", "8 ms late, on its own sensors", 0.5, {"delay": 0.008, "sensors": IMU}),
+    World("level", "friction 0.6", 0.05, ({"friction": 0.6},)),
+    World("slippery", "friction 0.3, 3 kg", 0.05, (_SLIPPERY,), _FLAT_GAITS),
+    World("uneven", "boxes of 6 cm, or 8 deg", 0.25, _UNEVEN),
+    World("late", "8 ms late, on its own sensors", 0.5, (_LATE,)),
 )
 
 
@@ -216,7 +206,10 @@ class Judge:
             raise
         except Exception as error:  # whatever it is, it is what is looked for
             said, raised = None, error
-        self._check_error(call, before, raised)
+        must, may = _errors(call, before)
+        if not (isinstance(raised, may) if raised else not must):
+            what = f"{type(raised).__name__}: {raised}" if raised else "no error"
+            self.found["errors"].append(f"{call} in mode {before.value}: {what}")
         wrong, self._second = second.ended(), _Second(self._robot, "")
         if wrong:
             self.found["hangs" if second.is_alive() else "errors"].append(f"{call}: {wrong}")
@@ -228,12 +221,6 @@ class Judge:
         go2.wait(call.pause)
         if not self._is_limp:  # one that was told to go limp may have fallen
             self.found["falls"] += map(str, watch.all_falls[falls:])
-
-    def _check_error(self, call: Call, mode: Mode, raised: Exception | None) -> None:
-        must, may = _errors(call, mode)
-        if not (isinstance(raised, may) if raised else not must):
-            what = f"{type(raised).__name__}: {raised}" if raised else "no error"
-            self.found["errors"].append(f"{call} in mode {mode.value}: {what}")
 
     def _judge(self, call: Call, said: bool, has_ended: bool) -> None:
         reason = self._robot.go2.last_outcome.reason
@@ -265,7 +252,11 @@ class Judge:
         if call.name in ("stand", "recover") or (call.name == "walk" and not said):
             return self._stands(now, room)
         if call.name == "sit":
-            return self._sits(now, room)
+            pitch, feet = float(now.rpy[-1, 1]), now.p_world_feet[-1, 2:, 2].mean()
+            rear = now.q[-1, 2] - REAR_END * math.sin(pitch) - feet
+            if pitch > SIT_PITCH or rear + FOOT_RADIUS > SIT_REAR_HEIGHT:
+                return f"pitch {math.degrees(pitch):.0f} deg, rear end at {rear:.2f} m"
+            return _unrest(now, room)
         if call.name == "lie_down":
             is_down = now.q[-1, 2] - now.p_world_feet[-1, :, 2].min() + FOOT_RADIUS < LYING_HEIGHT
             return None if is_down and _tilt(now) < 0.5 else "does not lie"
@@ -289,13 +280,6 @@ class Judge:
             return f"tilt {math.degrees(_tilt(now)):.1f} deg"
         return _unrest(now, room)
 
-    def _sits(self, now: TruthRecording, room: float) -> str | None:
-        pitch = float(now.rpy[-1, 1])
-        rear = now.q[-1, 2] - REAR_END * math.sin(pitch) - now.p_world_feet[-1, 2:, 2].mean()
-        if pitch > SIT_PITCH or rear + FOOT_RADIUS > SIT_REAR_HEIGHT:
-            return f"pitch {math.degrees(pitch):.0f} deg, rear end at {rear:.2f} m"
-        return _unrest(now, room)
-
     def _goes(self, call: Call, recorded: TruthRecording, room: float) -> str | None:
         """Against where it was when the goal began: when it was at rest, and told to go."""
         q, yaw = recorded.q[self._goal_row], recorded.rpy[self._goal_row, 2]
@@ -315,7 +299,7 @@ class Judge:
         (name,), robot = call.arguments, self._robot
         recorded = during_motion(robot.go2, robot.truth, name)
         anchor = Anchor.of_feet(recorded.p_world_feet[0].copy(), FOOT_RADIUS)
-        asked = placed(_plan(name), recorded.time - recorded.time[0], anchor)
+        asked = placed(plan_of(name), recorded.time - recorded.time[0], anchor)
         trunk, turned = trunk_off(asked, recorded), turned_off(asked, recorded)
         touching = (recorded.trunk_force > TOUCH) | (recorded.limb_force > TOUCH)
         touched = float(touching.sum()) * robot.plant.control_period
@@ -370,15 +354,10 @@ class _Second:
         return f"{self._name} in the second thread: {raised!r}"
 
 
-@cache
-def _plan(name: str) -> CompiledPlan:
-    return compile_timeline(load_motion(name), RobotModel())
-
-
 def _made(go2: GO2Controller, call: Call) -> bool | None:
     """What the call says; None if it says nothing."""
     if call.name == "play" and not call.is_wrong:
-        return go2.play(_plan(call.arguments[0]), check=False)
+        return go2.play(plan_of(call.arguments[0]), check=False)
     if call.name in ("stop", "wait"):
         last = go2.last_outcome
         getattr(go2, call.name)(*call.arguments)
@@ -452,19 +431,14 @@ def measure_sequence(
 
 
 STUDIES = tuple(
-    Study(
-        f"{world.name}",
-        {f"{CALLS} calls, {world.item}": ROWS},
-        partial(measure_sequence, world=world),
-        sensors=None,
-    )
+    Study(world.name, {f"{CALLS} calls, {world.item}": ROWS}, measure, sensors=None)
     for world in WORLDS
+    for measure in (partial(measure_sequence, world=world),)
 )
-BENCHMARK = Benchmark(
+run = Benchmark(
     "sequences",
     "Random calls in a row, in four worlds: does every answer hold in truth?",
     STUDIES,
     takes="five minutes",
     examples=("--seeds 250", "--rows late --seeds 50"),
-)
-run = BENCHMARK.run
+).run

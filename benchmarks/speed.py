@@ -20,11 +20,12 @@ import numpy as np
 
 from benchmarks import speed_learning, speed_solves, speed_ticks
 from benchmarks.command import Benchmark
+from benchmarks.robots import checker
+from benchmarks.speed_ticks import timed
 from benchmarks.store import ROOT
 from benchmarks.study import Study, TrialResult
 from controller.sweeps.trials import Trial, TrialFailed
-from go2_wbc.robot.model import RobotModel
-from motions import FeasibilityChecker, Timeline, compile_timeline, load_motion
+from motions import Timeline, compile_timeline, load_motion
 
 ROUNDS = 9  #: Times that every motion is compiled and checked, in turn with the others
 LIBRARY = "tap_dance"
@@ -32,13 +33,12 @@ LIBRARY = "tap_dance"
 LENGTHS = (10, 40)
 """Lengths [s] of the generated motions; that the work grows as they do, a test says by counting."""
 CHECK_BAR = 60.0  #: Greatest cost [ms] of checking 10 s of motion, with its probability
-_MOTIONS = (LIBRARY, *(f"{seconds} s" for seconds in LENGTHS))
 CHECKS = {
     f"10 s of motion: {motion}": (
         (f"check.{motion}", "check", f"<= {CHECK_BAR:g} ms"),
         (f"compile.{motion}", "compile", "ms"),
     )
-    for motion in _MOTIONS
+    for motion in (LIBRARY, *(f"{seconds} s" for seconds in LENGTHS))
 }
 PROCESSES = 5  # Fresh processes of a trial; the median counts
 ROBOT = "from controller import GO2Controller; go2 = GO2Controller()"
@@ -52,8 +52,6 @@ STARTS: dict[str, tuple[str, str, float | None]] = {
     "demo": ("`go2-wbc demo --no-media`, to its end", DEMO, 5.0),
 }
 """What is started: its name, its code, and the processor time [s] that it may take."""
-_NO_BYTECODE = "PYTHONDONTWRITEBYTECODE"
-"""Kept from the processes: a user's Python compiles a module once, not at every start."""
 STARTED = {
     item: (
         (f"{name}.cpu", "processor time", "s" if most is None else f"<= {most:g} s"),
@@ -77,25 +75,17 @@ def lively_motion(seconds: float) -> Timeline:
 
 def measure_checks(_trial: Trial, found: TrialResult) -> None:
     """Median of compiling and checking a motion of the library, a short and a long one."""
-    model = RobotModel()
-    checker = FeasibilityChecker(model)
-    lines = [load_motion(LIBRARY), *(lively_motion(seconds) for seconds in LENGTHS)]
-    motions = dict(zip(_MOTIONS, lines, strict=True))
-    acts: dict[str, Callable[[], object]] = {}
-    durations: dict[str, float] = {}
-    for name, line in motions.items():
-        plan = compile_timeline(line, model)
-        checker.check(plan)  # what is prepared once for a robot is not counted
-        acts[f"check.{name}"] = lambda plan=plan: checker.check(plan).probability
-        acts[f"compile.{name}"] = partial(compile_timeline, line, model)
-        durations[f"check.{name}"] = durations[f"compile.{name}"] = line.end
-    spent: dict[str, list[float]] = {name: [] for name in acts}
-    for _ in range(ROUNDS):
-        for name, act in acts.items():
-            start = time.thread_time_ns()
-            act()
-            spent[name].append((time.thread_time_ns() - start) / 1e6)
-    found.values = {n: float(np.median(s)) * 10.0 / durations[n] for n, s in spent.items()}
+    lines = {LIBRARY: load_motion(LIBRARY)}
+    lines |= {f"{seconds} s": lively_motion(seconds) for seconds in LENGTHS}
+    acts: dict[str, tuple[float, Callable[[], object]]] = {}
+    for name, line in lines.items():
+        plan = compile_timeline(line, checker().model)
+        checker().check(plan)  # what is prepared once for a robot is not counted
+        check = partial(lambda plan: checker().check(plan).probability, plan)
+        acts[f"check.{name}"] = line.end, check
+        acts[f"compile.{name}"] = line.end, partial(compile_timeline, line, checker().model)
+    rounds = [{n: timed(act, 1)[0] / end for n, (end, act) in acts.items()} for _ in range(ROUNDS)]
+    found.values = {n: float(np.median([spent[n] for spent in rounds])) / 100.0 for n in acts}
 
 
 # --- how long a user waits: for a robot, for it to stand, for the demo's table --------------------
@@ -119,11 +109,11 @@ def started(code: str) -> tuple[float, float]:
     Raises:
         TrialFailed: if it fails.
     """
-    environment = {name: value for name, value in os.environ.items() if name != _NO_BYTECODE}
-    environment["PYTHONPATH"] = str(ROOT)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # a user's Python compiles a module once
+    command = [sys.executable, "-c", code]
     with tempfile.TemporaryDirectory() as folder:
         before, start = _children_time(), time.perf_counter()
-        command = [sys.executable, "-c", code]
         done = subprocess.run(
             command, env=environment, cwd=folder, capture_output=True, text=True, check=False
         )
@@ -150,7 +140,7 @@ STUDIES = (
     Study("dataset", speed_learning.DATASET_TABLE, speed_learning.measure_dataset),
     Study("realtime", speed_ticks.REALTIME, speed_ticks.measure_realtime),
 )
-BENCHMARK = Benchmark(
+run = Benchmark(
     "speed",
     "Processor time of the whole-body QP beside PlaCo's on the same states in turn,\n"
     "of whole ticks with 2 ms of physics, of checking a motion, of starts, of\n"
@@ -160,5 +150,4 @@ BENCHMARK = Benchmark(
     takes="ten minutes",
     examples=("solves ticks --runs 5", "--json --out speed.json"),
     runs=3,
-)
-run = BENCHMARK.run
+).run

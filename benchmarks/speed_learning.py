@@ -51,16 +51,13 @@ def measure_environments(_trial: Trial, found: TrialResult) -> None:
                 _spent(environment, actions[:50], time.process_time)
                 spent = _spent(environment, actions, time.process_time)
                 found.values[f"{name}.{kind}"] = STEPS / RATE / spent
-    with closing(Go2Env()) as one, _together(2) as two, _together(MANY) as many:
+    together = [closing(Go2VectorEnv(count, workers=2)) for count in (2, MANY)]
+    with closing(Go2Env()) as one, together[0] as two, together[1] as many:
         ratios = [
-            [_spent(one, actions) * count / _spent(envs, actions) for count, envs in rows]
-            for rows in [((2, two), (MANY, many))] * ROUNDS
+            [_spent(one, actions) * envs.num_envs / _spent(envs, actions) for envs in (two, many)]
+            for _ in range(ROUNDS)
         ]
     found.values |= dict(zip(("two", "many"), np.median(ratios, axis=0).tolist(), strict=True))
-
-
-def _together(count: int) -> closing[Go2VectorEnv]:
-    return closing(Go2VectorEnv(count, workers=2))
 
 
 def _spent(

@@ -24,6 +24,8 @@ from go2_wbc.wbc.config import Gains, WbcConfig
 
 BASE = "base"
 Mode = tuple[tuple[LegTask, ...], TrackedPoint]
+PositionTask = placo.DynamicsCoMTask | placo.DynamicsPositionTask
+BodyTask = PositionTask | placo.DynamicsOrientationTask
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +33,7 @@ class _Solver:
     """PlaCo's solver with the tasks of one contact mode."""
 
     qp: placo.DynamicsSolver
-    position: placo.DynamicsCoMTask | placo.DynamicsPositionTask
+    position: PositionTask
     orientation: placo.DynamicsOrientationTask
     swings: dict[Leg, placo.DynamicsPositionTask]
     postures: dict[Leg, placo.DynamicsJointsTask]
@@ -101,13 +103,7 @@ class BarePlaco:
         contact.mu, contact.weight_forces = config.friction, config.force_weight
 
 
-def _set_gains(
-    task: placo.DynamicsCoMTask
-    | placo.DynamicsPositionTask
-    | placo.DynamicsOrientationTask
-    | placo.DynamicsJointsTask,
-    gains: Gains,
-) -> None:
+def _set_gains(task: BodyTask | placo.DynamicsJointsTask, gains: Gains) -> None:
     task.kp, task.kd = fmean(gains.kp), fmean(gains.kd)
 
 

@@ -96,19 +96,15 @@ def measure_solves(trial: Trial, found: TrialResult) -> None:
     ours, placo = WholeBodyController(model, config=config), BarePlaco(model, config)
     values = found.values
     for feet, ticks in recorded_ticks(trial).items():
-        spent = interleaved(
-            ticks,
-            {
-                "ours": lambda tick, asked: ours.solve(model.snapshot(tick.state), asked),
-                "placo": lambda tick, asked: placo.tick(tick.state, asked),
-            },
-        )
-        median = {name: float(np.median(times)) for name, times in spent.items()}
-        p99 = {name: float(np.quantile(times, 0.99)) for name, times in spent.items()}
-        for name in spent:
-            values |= {f"{feet}.{name}": median[name], f"{feet}.{name}_p99": p99[name]}
-        values[f"{feet}.faster"] = median["placo"] / median["ours"]
-        values[f"{feet}.tail"] = p99["ours"] / p99["placo"]
+        solvers: Mapping[str, Callable[[Tick, Reference], object]] = {
+            "ours": lambda tick, asked: ours.solve(model.snapshot(tick.state), asked),
+            "placo": lambda tick, asked: placo.tick(tick.state, asked),
+        }
+        for name, times in interleaved(ticks, solvers).items():
+            values[f"{feet}.{name}"] = float(np.median(times))
+            values[f"{feet}.{name}_p99"] = float(np.quantile(times, 0.99))
+        values[f"{feet}.faster"] = values[f"{feet}.placo"] / values[f"{feet}.ours"]
+        values[f"{feet}.tail"] = values[f"{feet}.ours_p99"] / values[f"{feet}.placo_p99"]
         if feet == TROT:
             values |= _explaining(ours, ticks)
 
@@ -142,7 +138,8 @@ def interleaved(
 
     What reading the clock takes, half a microsecond, is left out.
     """
-    clock = _clock_time()
+    readings = [(time.thread_time_ns(), time.thread_time_ns()) for _ in range(1000)]
+    clock = float(np.median([after - before for before, after in readings])) / 1e3
     spent: dict[str, list[float]] = {name: [] for name in solvers}
     for tick in [*ticks[:WARM_UP], *ticks]:
         for name, solve in solvers.items():
@@ -151,12 +148,6 @@ def interleaved(
             solve(tick, asked)
             spent[name].append((time.thread_time_ns() - start) / 1e3 - clock)
     return {name: times[-len(ticks) :] for name, times in spent.items()}
-
-
-def _clock_time() -> float:
-    """Median thread time [us] between two readings of the clock."""
-    readings = [(time.thread_time_ns(), time.thread_time_ns()) for _ in range(1000)]
-    return float(np.median([after - before for before, after in readings])) / 1e3
 
 
 def slowness(trotting: Sequence[Tick]) -> float:

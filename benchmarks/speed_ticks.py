@@ -141,12 +141,10 @@ def _prepared(go2: GO2Controller, mode: str) -> Callable[[], object]:
 
 
 def measure_estimated(trial: Trial, found: TrialResult) -> None:
-    """Ticks of a trot on its own sensors.
-
-    The worst tick is told as in ``measure_commands``.
-    """
+    """Ticks of a trot on its own sensors; the worst is told as in ``measure_commands``."""
     slow = slowness(recorded_ticks(trial)[2])
-    walks = np.array([_estimated(trial) for _ in range(REPEATS)])
+    plants = (MujocoPlant(sensors="imu", seed=trial.seed) for _ in range(REPEATS))
+    walks = np.array([_trotted(plant, 1.0, 1.0, ESTIMATED_TIME) for plant in plants])
     found.values = _tail(walks[0], walks.min(axis=0))
     found.values["factor"] = PERIOD / float(walks[0].mean()) * slow
 
@@ -188,15 +186,8 @@ def measure_sight(trial: Trial, found: TrialResult) -> None:
 
 def _climbed(plant: _Scanning) -> tuple[np.ndarray, list[Scan]]:
     """Time [us] of each tick less its ray casting, and the scans."""
-    with timed_robot(plant) as (go2, ends):
-        _require(go2, go2.walk())
-        go2.move(0.3)
-        ends.clear()
-        plant.casting.clear()
-        go2.wait(SIGHT_TIME)
-        _require(go2)
-        spent = np.diff(ends) / 1e3
-        return spent - plant.casting[1 : len(ends)], plant.scans
+    spent = _trotted(plant, 0.3, 0.0, SIGHT_TIME)
+    return spent - plant.casting[-len(spent) :], plant.scans
 
 
 def _tail(spent: np.ndarray, least: np.ndarray) -> dict[str, float]:
@@ -210,15 +201,14 @@ def _tail(spent: np.ndarray, least: np.ndarray) -> dict[str, float]:
     }
 
 
-def _estimated(trial: Trial) -> np.ndarray:
-    """Time [us] of each tick; a fresh robot, the same each time."""
-    plant = MujocoPlant(sensors="imu", seed=trial.seed)
+def _trotted(plant: MujocoPlant, speed: float, lead: float, time: float) -> np.ndarray:
+    """Time [us] of each tick of a trot at ``speed`` [m/s], ``lead`` [s] after the command."""
     with timed_robot(plant) as (go2, ends):
         _require(go2, go2.walk())
-        go2.move(1.0)
-        go2.wait(1.0)
+        go2.move(speed)
+        go2.wait(lead)
         ends.clear()
-        go2.wait(ESTIMATED_TIME)
+        go2.wait(time)
         _require(go2)
         return np.diff(ends) / 1e3
 
@@ -238,30 +228,23 @@ def measure_commands(trial: Trial, found: TrialResult) -> None:
 
 
 def _walked(trial: Trial) -> tuple[np.ndarray, np.ndarray, float]:
-    """Time [us] of ticks and of bare work, and what ``_peak`` says; a fresh robot."""
+    """Time [us] of each tick and of as many pieces of bare work, second by second in turn.
+
+    And what ``_peak`` says. What happens between two commands belongs to no tick.
+    """
     plant, random = trial.plant(), np.random.default_rng(trial.seed)
+    spent, bare = [], []
     with timed_robot(plant) as (go2, ends):
         go2.walk()
-        return *_walk(go2, random, ends), _peak(plant, go2)
-
-
-def _walk(
-    go2: GO2Controller, random: np.random.Generator, ends: list[int]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Time [us] of each tick, and of as many pieces of bare work, second by second in turn.
-
-    What happens between two commands belongs to no tick.
-    """
-    spent, bare = [], []
-    for _ in range(round(COMMAND_TIME)):
-        ahead, aside, turn = random.uniform(-1.0, 1.0, 3) * FASTEST
-        go2.move(float(ahead), float(turn), linear_y=float(aside))
-        ends.clear()
-        go2.wait(1.0)
-        _require(go2)
-        spent.append(np.diff(ends) / 1e3)
-        bare.append(timed(bare_work(float(np.median(spent[-1]))), len(spent[-1])))
-    return np.concatenate(spent), np.concatenate(bare)
+        for _ in range(round(COMMAND_TIME)):
+            ahead, aside, turn = random.uniform(-1.0, 1.0, 3) * FASTEST
+            go2.move(float(ahead), float(turn), linear_y=float(aside))
+            ends.clear()
+            go2.wait(1.0)
+            _require(go2)
+            spent.append(np.diff(ends) / 1e3)
+            bare.append(timed(bare_work(float(np.median(spent[-1]))), len(spent[-1])))
+        return np.concatenate(spent), np.concatenate(bare), _peak(plant, go2)
 
 
 def _peak(plant: MujocoPlant, go2: GO2Controller) -> float:

@@ -39,8 +39,10 @@ class Store:
     files: dict[str, SweepFile]  #: by study
 
     def add(self, study: Study, seed: int, result: TrialResult) -> None:
-        """Keep a trial: whoever kills the process leaves all of it or nothing."""
-        self.files[study.name].add(seed, row_of(study, result))
+        """Keep a trial, all of it or nothing, as the row of a sweep; nan is no value."""
+        values = {m.name: float(result.values.get(m.name, math.nan)) for m in study.metrics}
+        words = {name: json.dumps(getattr(result, name)) for name in _WORDS}
+        self.files[study.name].add(seed, {**values, "reason": result.reason, **words})
 
 
 @contextmanager
@@ -72,13 +74,6 @@ def opened(folder: Path, studies: Iterable[Study], *, resume: bool) -> Iterator[
 def file_of(folder: Path, study: Study) -> Path:
     """Where the trials of a study are kept."""
     return folder / f"{study.name.replace(', ', '-').replace(' ', '_')}.sqlite"
-
-
-def row_of(study: Study, result: TrialResult) -> Row:
-    """A trial as the row of a sweep; nan is no value."""
-    values = {m.name: float(result.values.get(m.name, math.nan)) for m in study.metrics}
-    words = {name: json.dumps(getattr(result, name)) for name in _WORDS}
-    return {**values, "reason": result.reason, **words}
 
 
 def result_of(study: Study, row: Row) -> TrialResult:

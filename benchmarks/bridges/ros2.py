@@ -69,11 +69,9 @@ def _round_trips(probe: Probe) -> dict[str, float]:
             continue
         if not answer.success:
             times.append(1000.0 * (time.perf_counter() - began))
-    return {
-        "round_trip_p50": float(np.percentile(times, 50)) if times else math.nan,
-        "round_trip_p99": float(np.percentile(times, 99)) if times else math.nan,
-        "calls_lost": float(CALLS - len(times)),
-    }
+    p50, p99 = np.percentile(times or [math.nan], (50, 99)).tolist()
+    lost = float(CALLS - len(times))
+    return {"round_trip_p50": p50, "round_trip_p99": p99, "calls_lost": lost}
 
 
 def _drive(probe: Probe) -> dict[str, float]:

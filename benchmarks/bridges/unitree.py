@@ -55,18 +55,19 @@ def measure_sport(_trial: Trial, found: TrialResult) -> None:
     """The script of a SportClient: up, balance, move, stop, hello, Euler, down."""
     with scene() as at:
 
-        def code_of(api: Api, parameter: str = "{}") -> int:
-            code = at.call(api, parameter)
-            at.wait_for_rest()
-            return code
+        def codes_of(*calls: Api) -> list[int]:
+            codes = []
+            for api in calls:
+                tilt = '{"x": 0.1, "y": 0.1, "z": 0.1}' if api is Api.EULER else "{}"
+                codes.append(at.call(api, tilt))
+                at.wait_for_rest()
+            return codes
 
-        codes = [code_of(Api.STAND_UP), code_of(Api.BALANCE_STAND)]
+        codes = codes_of(Api.STAND_UP, Api.BALANCE_STAND)
         speed = _move(at)
-        codes.append(code_of(Api.STOP_MOVE))
+        codes += codes_of(Api.STOP_MOVE)
         trips = timeit.repeat(lambda: at.client.call(Api.STOP_MOVE), number=1, repeat=ROUND_TRIPS)
-        codes.append(code_of(Api.HELLO))
-        codes.append(code_of(Api.EULER, '{"x": 0.1, "y": 0.1, "z": 0.1}'))
-        codes.append(code_of(Api.STAND_DOWN))
+        codes += codes_of(Api.HELLO, Api.EULER, Api.STAND_DOWN)
         require(at.height <= 0.12, f"StandDown left the base at {at.height:.2f} m")
     found.values = {
         "codes": float(np.count_nonzero(codes)),

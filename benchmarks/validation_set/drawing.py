@@ -89,9 +89,18 @@ def moved(
     return line.body(**values, over=over, ease=ease)
 
 
-def to_and_fro(line: Timeline, channel: str, size: float, over: float) -> Timeline:
-    """``line`` and a move of the trunk there, and as far to the other side."""
-    return moved(moved(line, {channel: size}, over), {channel: -size}, over)
+def to_and_fro(line: Timeline, channel: str, size: float, over: float, times: int = 1) -> Timeline:
+    """``line`` and moves of the trunk there, and as far to the other side."""
+    for _ in range(times):
+        line = moved(moved(line, {channel: size}, over), {channel: -size}, over)
+    return line
+
+
+def tapped(line: Timeline, leg: Leg, z: float, up: float, down: float, times: int) -> Timeline:
+    """``line`` and a foot raised and put down again."""
+    for _ in range(times):
+        line = line.foot(leg, z=z, over=up).down(leg, over=down)
+    return line
 
 
 def named(*writes: Write) -> dict[str, Write]:

@@ -4,8 +4,10 @@ from benchmarks.validation_set.drawing import (
     BODY_SIZES,
     Draw,
     Family,
+    Write,
     moved,
     named,
+    tapped,
     to_and_fro,
 )
 from go2_wbc.legs import LEGS
@@ -36,26 +38,20 @@ def _reach_aside(draw: Draw, s: float) -> Timeline:
 
 
 def _taps(draw: Draw, s: float) -> Timeline:
-    leg, line, z = draw.leg(), Timeline(), draw.between(0.03, 0.07)
+    leg, z = draw.leg(), draw.between(0.03, 0.07)
     up, down = draw.between(0.16, 0.24) / s, draw.between(0.12, 0.2) / s
-    for _ in range(draw.count(1, 4)):
-        line = line.foot(leg, z=z, over=up).down(leg, over=down)
-    return line.home(over=0.8)
+    return tapped(Timeline(), leg, z, up, down, draw.count(1, 4)).home(over=0.8)
 
 
 def _stamps(draw: Draw, s: float) -> Timeline:
-    leg, line = draw.leg(), Timeline()
-    z, up, down = draw.between(0.05, 0.09), draw.between(0.3, 0.5), draw.between(0.12, 0.25) / s
-    for _ in range(draw.count(1, 3)):
-        line = line.foot(leg, z=z, over=up).down(leg, over=down)
-    return line.home(over=0.8)
+    leg, z = draw.leg(), draw.between(0.05, 0.09)
+    up, down = draw.between(0.3, 0.5), draw.between(0.12, 0.25) / s
+    return tapped(Timeline(), leg, z, up, down, draw.count(1, 3)).home(over=0.8)
 
 
 def _high_stamps(draw: Draw, s: float) -> Timeline:
-    leg, line, over = draw.leg(), Timeline(), draw.between(0.25, 0.4)
-    for _ in range(draw.count(1, 3)):
-        line = line.foot(leg, z=0.1 * s, over=over).down(leg, over=over)
-    return line.home(over=0.8)
+    leg, over = draw.leg(), draw.between(0.25, 0.4)
+    return tapped(Timeline(), leg, 0.1 * s, over, over, draw.count(1, 3)).home(over=0.8)
 
 
 def _lifts_in_turn(draw: Draw, s: float) -> Timeline:
@@ -126,18 +122,17 @@ def _high_five(draw: Draw, s: float) -> Timeline:
 
 def _slide(draw: Draw, s: float) -> Timeline:
     leg, axis = draw.leg(), draw.one_of(("x", "y"))
-    size, z = s * draw.either(0.02, 0.05), draw.between(0.004, 0.012)
-    x, y = (size, 0.0) if axis == "x" else (0.0, size)
-    line = Timeline().foot(leg, x=x, y=y, z=z, over=draw.between(0.4, 0.8))
+    way, z = {axis: s * draw.either(0.02, 0.05)}, draw.between(0.004, 0.012)
+    line = Timeline().foot(leg, **way, z=z, over=draw.between(0.4, 0.8))
     return line.down(leg, over=0.5).home(over=0.8)
 
 
 def _low_pass(draw: Draw, s: float) -> Timeline:
     leg, axis, z = draw.leg(), draw.one_of(("x", "y")), draw.between(0.02, 0.04)
     size, over = s * draw.either(0.04, 0.08), draw.between(0.4, 0.8)
-    x, y = (size, 0.0) if axis == "x" else (0.0, size)
-    line = Timeline().foot(leg, z=z, over=0.4).foot(leg, x=x, y=y, z=z, over=over)
-    line = line.foot(leg, x=-x, y=-y, z=z, over=over)
+    line = Timeline().foot(leg, z=z, over=0.4)
+    for way in (size, -size):
+        line = line.foot(leg, **{axis: way}, z=z, over=over)
     return line.down(leg, over=0.5).home(over=0.8)
 
 
@@ -210,29 +205,22 @@ def _random_paws(draw: Draw, s: float) -> Timeline:
     return line
 
 
-def _random_paws_faster(draw: Draw, s: float) -> Timeline:
-    return _random_paws(draw, 0.8).scale_time(1.0 / s)
-
-
-def _library_faster(draw: Draw, s: float) -> Timeline:
-    return load_motion(draw.one_of(LIBRARY)).scale_time(1.0 / s)
-
-
-def _library_larger(draw: Draw, s: float) -> Timeline:
-    return load_motion(draw.one_of(LIBRARY)).scale(s)
-
-
 _WRITERS = (
     _paw_up, _reach_ahead, _reach_aside, _taps, _stamps, _high_stamps, _lifts_in_turn,
     _higher_lifts_in_turn, _nod_on_three, _shift_on_three, _wave_a_leg, _faster_wave, _one_joint,
     _high_five, _slide, _low_pass, _kick_back, _paw_with_trunk, _lean_and_lift, _unweight_sooner,
     _paw_circle, _two_feet_at_once,  _paws_to_beats, _bow_sway_paw, _random_paws,
-    _random_paws_faster, _library_faster, _library_larger,
 )  # fmt: skip
+_FASTER: dict[str, Write] = {
+    "random_paws_faster": lambda draw, s: _random_paws(draw, 0.8).scale_time(1.0 / s),
+    "library_faster": lambda draw, s: load_motion(draw.one_of(LIBRARY)).scale_time(1.0 / s),
+    "library_larger": lambda draw, s: load_motion(draw.one_of(LIBRARY)).scale(s),
+}
 _TURNING = {"wave_a_leg": 2.5, "one_joint": 2.0, "high_five": 2.5}
 """Amplitudes beyond which an angle or a height would be taken for a mistake in units."""
 FEET = tuple(
-    Family(name, write, high=_TURNING.get(name, 4.0)) for name, write in named(*_WRITERS).items()
+    Family(name, write, high=_TURNING.get(name, 4.0))
+    for name, write in {**named(*_WRITERS), **_FASTER}.items()
 )
 
 
@@ -241,10 +229,8 @@ FEET = tuple(
 
 def _long_step(draw: Draw, s: float) -> Timeline:
     axis, size = draw.one_of((("x", 0.12), ("y", 0.08)))
-    leg, way = draw.leg(), s * draw.sign() * size
-    x, y = (way, 0.0) if axis == "x" else (0.0, way)
-    line = Timeline().step(leg, x, y, over=draw.between(0.4, 0.8))
-    return line.home(over=0.8)
+    leg, way = draw.leg(), {axis: s * draw.sign() * size}
+    return Timeline().step(leg, **way, over=draw.between(0.4, 0.8)).home(over=0.8)
 
 
 def _hasty_step(draw: Draw, s: float) -> Timeline:
@@ -283,14 +269,15 @@ def _leaning(going: Timeline, draw: Draw, s: float) -> Timeline:
     return Timeline().together(going, lean.home(over=over))
 
 
-def _leaning_walk(draw: Draw, s: float) -> Timeline:
-    walk = Timeline().walk(draw.either(0.1, 0.3), turn=deg(draw.either(0.0, 20.0)))
+def _leaning_walk(
+    draw: Draw, s: float, far: float = 0.3, turn: float = 20.0, gait: str = "walk"
+) -> Timeline:
+    walk = Timeline().walk(draw.either(0.1, far), turn=deg(draw.either(0.0, turn)), gait=gait)
     return _leaning(walk, draw, s)
 
 
 def _leaning_trot(draw: Draw, s: float) -> Timeline:
-    walk = Timeline().walk(draw.either(0.1, 0.4), turn=deg(draw.either(0.0, 30.0)), gait="trot")
-    return _leaning(walk, draw, s)
+    return _leaning_walk(draw, s, 0.4, 30.0, "trot")
 
 
 def _nodding_side_step(draw: Draw, s: float) -> Timeline:

@@ -6,7 +6,7 @@ And at which amplitude it changes its mind: bisected by playing, and kept in a f
 import hashlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -94,10 +94,15 @@ def play(
         TrialFailed: if the robot does not get ready.
     """
     with TrialRobot(MujocoPlant(friction=FRICTION, seed=seed, sensors=sensors)) as robot:
-        robot.require(robot.go2.stand())
-        if plan.entry is Posture.SIT:
-            robot.require(robot.go2.sit())
+        get_ready(robot, plan)
         return measure_motion(robot.go2, robot.truth, plan, model)
+
+
+def get_ready(robot: TrialRobot, plan: MotionPlan) -> None:
+    """Take the posture in which a plan begins; raises ``TrialFailed`` if that is not done."""
+    robot.require(robot.go2.stand())
+    if plan.entry is Posture.SIT:
+        robot.require(robot.go2.sit())
 
 
 def is_done(question: Question) -> bool:
@@ -108,44 +113,54 @@ def is_done(question: Question) -> bool:
 
 
 def measure_border(trial: Trial, found: TrialResult) -> None:
-    """The border of draw number ``trial.seed``, or why there is none.
-
-    From amplitude 1 in steps to the first one at which physics changes its mind, then by bisection.
-    """
+    """The border of draw number ``trial.seed``, or why there is none."""
     family, number = draws()[trial.seed]
     step, near = (STEP_SOLVED, NEAR_SOLVED) if family.is_dynamic else (STEP, NEAR)
-    done, failed = family.low, family.high
     found.values[PLAYS] = 0.0
-    is_low_done = is_high_failed = False
-    middle = 1.0
-    while not (is_low_done and is_high_failed) or failed / done > near:
+
+    def is_right(amplitude: float) -> bool:
         found.values[PLAYS] += 1.0
-        if is_done(Question(family, number, middle)):
+        return is_done(Question(family, number, amplitude))
+
+    found.values[BORDER] = bisected(is_right, family.low, family.high, step, near)
+
+
+def bisected(
+    is_done: Callable[[float], bool], low: float, high: float, step: float, near: float
+) -> float:
+    """The amplitude from which on it is not done: stepwise from 1, then by bisection.
+
+    Args:
+        is_done: asks physics.
+        low, high: between which it is looked for.
+        step: ratio of the first amplitudes.
+        near: ratio of one that is done and one that failed at which the search ends.
+
+    Raises:
+        TrialFailed: if physics does not change its mind there.
+    """
+    done, failed, middle = low, high, 1.0
+    is_low_done = is_high_failed = False
+    while not (is_low_done and is_high_failed) or failed / done > near:
+        if is_done(middle):
             done, is_low_done = middle, True
         else:
             failed, is_high_failed = middle, True
         if is_low_done and is_high_failed:
             middle = math.sqrt(done * failed)
-        elif middle in (family.low, family.high):
+        elif middle in (low, high):
             why = "even the highest amplitude is done" if is_low_done else "the lowest one fails"
             raise TrialFailed(why)
         else:
-            onwards = middle * step if is_low_done else middle / step
-            middle = min(max(onwards, family.low), family.high)
-    found.values[BORDER] = math.sqrt(done * failed)
+            middle = min(max(middle * step if is_low_done else middle / step, low), high)
+    return math.sqrt(done * failed)
 
 
-BORDERS = Study(
-    "borders",
-    {
-        "border": (
-            (BORDER, "amplitude at which physics fails", ""),
-            (PLAYS, "motions played to find it", ""),
-        )
-    },
-    measure_border,
-    prefix="",
+ROWS = (
+    (BORDER, "amplitude at which physics fails", ""),
+    (PLAYS, "motions played to find it", ""),
 )
+BORDERS = Study("borders", {"border": ROWS}, measure_border, prefix="")
 
 
 # --- the file of borders --------------------------------------------------------------------------

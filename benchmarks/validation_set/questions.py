@@ -95,27 +95,19 @@ def questions(borders: Mapping[str, float | None]) -> list[Question]:
             mind; None where it does not between the family's bounds: then these stand for it, and
             there is no motion at the border.
     """
-    found = [
-        question
-        for family, number in draws()
-        if draw_name(family, number) in borders
-        for question in _around(family, number, borders[draw_name(family, number)])
-    ]
+    known = [draw for draw in draws() if draw_name(*draw) in borders]
+    found = [one for draw in known for one in _around(*draw, borders[draw_name(*draw)])]
     return list({question.name: question for question in found}.values())
 
 
 def dynamic_questions(borders: Mapping[str, float | None]) -> list[Question]:
     """The exam's dynamic motions, and ``EACH`` more of each family, with free numbers of their own.
 
-    Where physics does not change its mind there are twice as many draws, and none at a border.
-
-    Args:
-        borders: see ``questions``.
+    Where physics does not change its mind there are twice as many draws, and none at a border. For
+    ``borders`` see ``questions``.
     """
     more: list[Question] = []
-    for family in FAMILIES.values():
-        if not family.is_dynamic:
-            continue
+    for family in (family for family in FAMILIES.values() if family.is_dynamic):
         flip, number, own = borders[draw_name(family, 0)], FRESH_DYNAMIC, list[Question]()
         while len(own) < EACH:
             rng = Draw(f"more strata of {family.name}", number)

@@ -7,6 +7,7 @@ them judges.
 """
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal, TypeVar
 
@@ -57,7 +58,11 @@ class RandomTimeline:
 
 def random_timelines(count: int) -> list[RandomTimeline]:
     """All sizes of the first ``count`` timelines that can be written."""
-    return [one for number in range(count) for one in sizes_of(number) if _can_be_written(one)]
+    found: list[RandomTimeline] = []
+    for one in (size for number in range(count) for size in sizes_of(number)):
+        with suppress(TimelineError):
+            found += [one] if one.line.keys else []
+    return found
 
 
 def sizes_of(number: int) -> Iterator[RandomTimeline]:
@@ -69,13 +74,6 @@ def sizes_of(number: int) -> Iterator[RandomTimeline]:
         amplitude = 0.8 if kind == "tempo" else size
         pace = {"amplitude": 1.0, "tempo": size, "both": size**0.5}[kind]
         yield RandomTimeline(number, step, amplitude, pace)
-
-
-def _can_be_written(timeline: RandomTimeline) -> bool:
-    try:
-        return bool(timeline.line.keys)
-    except TimelineError:
-        return False
 
 
 class _Draw(Draw):

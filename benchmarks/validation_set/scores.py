@@ -60,24 +60,19 @@ class Share(NamedTuple):
         """Between which values the true share is; all of them if there is nothing."""
         if not self.n:
             return 0.0, 1.0
-        low, high = binomtest(self.right, self.n).proportion_ci(0.95, method="wilson")
-        return low, high
+        return tuple(binomtest(self.right, self.n).proportion_ci(0.95, method="wilson"))
 
     def __str__(self) -> str:
+        """``.953 .94-.96``; a share that rounds to 1 is as long as others."""
         if not self.n:
             return "-"
-        low, high = (_short(bound, 2) for bound in self.interval)
-        return f"{_short(self.value, 3)} {low}-{high}"
+        texts = [f"{self.value:.3f}", *(f"{bound:.2f}" for bound in self.interval)]
+        short = [text[:-1] if text.startswith("1") else text.removeprefix("0") for text in texts]
+        return "{} {}-{}".format(*short)
 
     def as_dict(self) -> dict[str, float | list[float]]:
         """Plain values, for JSON."""
         return {"right": self.right, "n": self.n, "value": self.value, "95%": [*self.interval]}
-
-
-def _short(share: float, digits: int) -> str:
-    """``.953``; a share that rounds to 1 is as long as others."""
-    text = f"{share:.{digits}f}"
-    return text[:-1] if text.startswith("1") else text.removeprefix("0")
 
 
 class Score(NamedTuple):
@@ -96,11 +91,11 @@ class Score(NamedTuple):
     def of(cases: Iterable[Case], definition: str = STRICT) -> Score:
         """The score on ``cases`` by a definition of ``controller.motion_measurement``."""
         pairs = [(bool(case.refusal), bool(case.outcome.by(definition))) for case in cases]
-        both, neither = pairs.count((True, True)), pairs.count((False, False))
-        refused, failed = sum(r for r, _ in pairs), sum(f for _, f in pairs)
-        shares = ((both, refused), (both, failed))
-        shares += ((neither, len(pairs) - refused), (neither, len(pairs) - failed))
-        return Score(*(Share(*share) for share in shares))
+        counts = []
+        for answer in (True, False):
+            right = pairs.count((answer, answer))
+            counts += [Share(right, [pair[k] for pair in pairs].count(answer)) for k in (0, 1)]
+        return Score(*counts)
 
     @property
     def n(self) -> int:

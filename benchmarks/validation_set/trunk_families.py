@@ -33,10 +33,8 @@ def _low_bow(draw: Draw, s: float) -> Timeline:
 
 
 def _twists(draw: Draw, s: float) -> Timeline:
-    line, yaw, over = Timeline(), draw.either(0.2, 0.35), draw.between(0.35, 0.8)
-    for _ in range(draw.count(1, 3)):
-        line = line.body(yaw=s * yaw, over=over).body(yaw=-s * yaw, over=over)
-    return line.home(over=over)
+    yaw, over = draw.either(0.2, 0.35), draw.between(0.35, 0.8)
+    return to_and_fro(Timeline(), "yaw", s * yaw, over, draw.count(1, 3)).home(over=over)
 
 
 def _two_tracks(draw: Draw, s: float) -> Timeline:
@@ -59,37 +57,30 @@ def _three_tracks(draw: Draw, s: float) -> Timeline:
 def _tempo(draw: Draw, s: float, channel: str, wide: float = 1.0) -> Timeline:
     """To and fro; the amplitude is the tempo."""
     size, over = wide * draw.between(0.3, 0.6) * BODY_SIZES[channel], draw.between(0.25, 0.35) / s
-    line = Timeline()
-    for _ in range(draw.count(2, 4)):
-        line = to_and_fro(line, channel, size, over)
-    return line.home(over=0.5)
+    return to_and_fro(Timeline(), channel, size, over, draw.count(2, 4)).home(over=0.5)
 
 
 def _sway_to_beats(draw: Draw, s: float) -> Timeline:
     channel, tempo = draw.one_of(CHANNELS), draw.between(90.0, 140.0)
     size, line = s * draw.between(0.4, 0.8) * BODY_SIZES[channel], Timeline().bpm(tempo)
-    for _ in range(draw.count(2, 4)):
-        line = to_and_fro(line, channel, size, 1)
-    return line.home(over=1)
+    return to_and_fro(line, channel, size, 1, draw.count(2, 4)).home(over=1)
 
 
 def _circle(draw: Draw, s: float) -> Timeline:
     turns, over = draw.count(1, 3), draw.between(0.9, 1.6)
-    x, y = s * draw.between(0.02, 0.05), s * draw.either(0.02, 0.05)
-    once = [{"x": x, "y": 0.0}, {"x": 0.0, "y": y}, {"x": -x, "y": 0.0}, {"x": 0.0, "y": -y}]
+    once = _round("x", s * draw.between(0.02, 0.05), "y", s * draw.either(0.02, 0.05))
     points = [*(turns * once), {"x": 0.0, "y": 0.0}]
     return Timeline().body_path(points, over=turns * over).home(over=0.6)
 
 
+def _round(first: str, one: float, second: str, two: float) -> list[dict[str, float]]:
+    ends = ((one, 0.0), (0.0, two), (-one, 0.0), (0.0, -two))
+    return [{first: one, second: two} for one, two in ends]
+
+
 def _nose_path(draw: Draw, s: float) -> Timeline:
     pitch, yaw, over = s * draw.between(0.2, 0.3), s * draw.either(0.2, 0.3), draw.between(1.0, 2.0)
-    points = [
-        {"pitch": pitch, "yaw": 0.0},
-        {"pitch": 0.0, "yaw": yaw},
-        {"pitch": -pitch, "yaw": 0.0},
-        {"pitch": 0.0, "yaw": -yaw},
-        {"pitch": 0.0, "yaw": 0.0},
-    ]
+    points = [*_round("pitch", pitch, "yaw", yaw), {"pitch": 0.0, "yaw": 0.0}]
     return Timeline().body_path(points, over=over).home(over=0.5)
 
 
@@ -153,17 +144,9 @@ def _random_trunk(draw: Draw, s: float) -> Timeline:
     return line.home(over=0.9)
 
 
-def _random_trunk_faster(draw: Draw, s: float) -> Timeline:
-    return _random_trunk(draw, 0.6).scale_time(1.0 / s)
-
-
 def _to_and_fro_mirrored(draw: Draw, s: float) -> Timeline:
     part = _there_and_back(draw, 0.8 * s, draw.one_of(("y", "roll", "yaw")))
     return part.then(part.mirror()).repeat(draw.count(1, 2))
-
-
-def _backwards(draw: Draw, s: float) -> Timeline:
-    return _random_trunk(draw, 0.8 * s).reverse()
 
 
 _WIDE: dict[str, Write] = {
@@ -177,8 +160,9 @@ _WIDE: dict[str, Write] = {
     **named(
         *(_low_bow, _twists, _two_tracks, _three_tracks, _sway_to_beats, _circle, _nose_path),
         *(_gaze, _jolts, _jump_cut, _sit_and_rise, _nod_sitting, _sits_and_sways, _lopsided_end),
-        *(_random_trunk, _to_and_fro_mirrored, _backwards),
+        *(_random_trunk, _to_and_fro_mirrored),
     ),
+    "backwards": lambda draw, s: _random_trunk(draw, 0.8 * s).reverse(),
 }
 _FAST: dict[str, Write] = {
     "fast_sway": lambda draw, s: _tempo(draw, s, draw.one_of(("x", "y"))),
@@ -186,7 +170,7 @@ _FAST: dict[str, Write] = {
     "fast_nod": lambda draw, s: _tempo(draw, s, "pitch"),
     "fast_twist": lambda draw, s: _tempo(draw, s, "yaw"),
     "fast_rock": lambda draw, s: _tempo(draw, s, "roll", 2.0),
-    **named(_random_trunk_faster),
+    "random_trunk_faster": lambda draw, s: _random_trunk(draw, 0.6).scale_time(1.0 / s),
 }
 TRUNK = (
     *(Family(name, write, high=2.5) for name, write in _WIDE.items()),

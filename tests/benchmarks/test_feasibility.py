@@ -12,7 +12,7 @@ from benchmarks.feasibility import (
     EXAM,
     OUTCOMES,
     REFUSED,
-    exam,
+    asked_of,
     judged,
     judged_dynamic,
     study_of,
@@ -82,7 +82,7 @@ def test_the_command_reports_and_writes_scores_and_no_motion_of_the_test_half(
     first = capsys.readouterr()
     printed = json.loads(first.out)
     assert printed == json.loads(file.read_text())
-    asked = exam()[:COUNT]
+    asked = asked_of(EXAM)[:COUNT]
     halves = [question.family.half for question in asked]
     assert printed["scores"]["test strict"]["n"] == halves.count(TEST)
     assert printed["scores"]["train strict"]["n"] == halves.count(TRAIN)

@@ -7,7 +7,7 @@ import pytest
 from benchmarks import combined
 from benchmarks.combined import CALLS, RESTING, measure_rest
 from benchmarks.study import TrialResult
-from benchmarks.unknown_world import Robot, no_file
+from benchmarks.unknown_world import Robot
 from controller.sweeps.trials import Trial
 
 OWN, GYM, MENAGERIE = RESTING
@@ -30,6 +30,6 @@ def test_stop_says_true_of_a_robot_that_stays_at_rest_and_is_ready_for_more(
     for name, value in (("SPEEDS", (speed,)), ("TIMES", (time,)), ("FIRST_SEED", 0)):
         monkeypatch.setattr(combined, name, value)
     found = TrialResult()
-    mjcf = robot.mjcf if robot is MENAGERIE else no_file
+    mjcf = robot.mjcf if robot is MENAGERIE else None
     measure_rest(Trial(0, sensors=sensors), found, replace(robot, mjcf=mjcf))
     assert found.values == dict.fromkeys(CALLS, 1.0), found.notes
