@@ -18,7 +18,6 @@ from benchmarks.command import Jobs, Output, RowsFile, positive, run_sweep
 from benchmarks.probability_fit import Bins, calibration
 from benchmarks.robots import checker
 from benchmarks.validation_set.physics import bisected
-from controller.cli.common import ExitCode
 from controller.sweeps.sweep_file import Row
 from controller.sweeps.trials import TrialFailed
 from go2_wbc.errors import MotionError
@@ -62,8 +61,7 @@ def run(
     shares, bins = measured(result.rows)
     is_ok = are_met(shares) and not result.failures
     values = {"passed": is_ok, "shares": shares, "bins": bins, "lost": result.failures}
-    output.publish(values, render(shares, bins))
-    return ExitCode.OK if is_ok else ExitCode.FAILED
+    return output.publish(values, render(shares, bins))
 
 
 def asked(seed: int) -> dict[str, object]:

@@ -39,14 +39,18 @@ class Output:
     json: Annotated[bool, "print JSON instead of the table"] = False
     out: Annotated[Path | None, "FILE", "also write the JSON here", output(".json")] = None
 
-    def publish(self, values: dict[str, Any], table: str) -> None:
-        """Print the table or the JSON, and write the JSON where it was asked for."""
+    def publish(self, values: dict[str, Any], table: str) -> int:
+        """Print the table or the JSON, write the JSON where it was asked for; gives the exit code.
+
+        ``values`` say whether all is ``passed``.
+        """
         if self.out is not None:
             write_atomically(self.out, (json.dumps(values, indent=2) + "\n").encode())
         if self.json:
             print_json(values)
         else:
             print(table)
+        return ExitCode.OK if values["passed"] else ExitCode.FAILED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,8 +159,7 @@ class Benchmark:
             _print_list(studies)
             return ExitCode.OK
         report = summarise(studies, measure_all(self.name, tasks, jobs=jobs, resume=resume))
-        output.publish(report.as_dict(), render(report))
-        return ExitCode.OK if report.ok else ExitCode.FAILED
+        return output.publish(report.as_dict(), render(report))
 
 
 # --- runs -----------------------------------------------------------------------------------------
@@ -194,13 +197,9 @@ def run_sweep(
     jobs: int,
     first_seed: int = 0,
 ) -> SweepResult:
-    """Run those of ``n`` seeds whose rows are not kept yet, and tell of the progress.
+    """Run those of ``n`` seeds whose rows are not kept yet, as ``sweep``; tell of the progress.
 
-    Args:
-        name: of the benchmark; the rows are kept in a file of that name, if not in ``rows``.
-        trial, n, first_seed: as in ``controller.sweep``.
-        rows: see ``RowsFile``.
-        jobs: processes.
+    The rows are kept in ``rows``, or in a file with the ``name`` of the benchmark.
 
     Raises:
         ConfigError: if the folder of the rows cannot be made, or they depend on something else.

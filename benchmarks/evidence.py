@@ -95,12 +95,9 @@ class Table:
         return {name for line in self.lines for name in line.metrics if name}
 
     def text(self, rows: Mapping[str, Row], before: str = "") -> str:
-        """The table as Markdown, from the results by metric.
+        """The table as Markdown, from the results by metric; raises as a line does.
 
         A line of which nothing was measured stays as it was ``before``.
-
-        Raises:
-            ConfigError: if a metric is missing or has no value.
         """
         found = [f"| {' | '.join(self.head)} |", "|" + "---|" * len(self.head)]
         old = [*before.splitlines()[len(found) :], *("" for _ in self.lines)]

@@ -32,7 +32,6 @@ from benchmarks.validation_set.physics import (
 )
 from benchmarks.validation_set.questions import Question, draw_name, draws
 from benchmarks.validation_set.scores import HALVES, Case, render, scores, wrong_ones
-from controller.cli.common import ExitCode
 from controller.motion_measurement import FELL
 from controller.sweeps.trials import Trial
 
@@ -88,8 +87,8 @@ def run(
     is_ok, verdict = (judged if rows == EXAM else judged_dynamic)(cases, len(seeds))
     values = {"passed": is_ok, "scores": {n: s.as_dict() for n, s in scores(cases).items()}}
     more = {"wrong": wrong_ones(cases)} if wrong else {}
-    output.publish(values | more, "\n".join([render(cases), *more.get("wrong", ()), verdict]))
-    return ExitCode.OK if is_ok else ExitCode.FAILED
+    text = "\n".join([render(cases), *more.get("wrong", ()), verdict])
+    return output.publish(values | more, text)
 
 
 @cache
@@ -175,5 +174,5 @@ def _bisect(
     write_borders({name: kept[name] for name in names if name in kept})
     none = sum(value is None for value in kept.values())
     text = f"{len(kept)} of {len(names)} borders, {none} beyond the bounds of their family"
-    output.publish({"borders": len(kept), "draws": len(names), "none": none}, text)
-    return ExitCode.OK if len(kept) == len(names) else ExitCode.FAILED
+    values = {"borders": len(kept), "draws": len(names), "none": none}
+    return output.publish({"passed": len(kept) == len(names), **values}, text)

@@ -150,13 +150,10 @@ def measure_right(trial: Trial, found: TrialResult) -> None:
 def laid_out(
     policy: Policy, order: np.ndarray, signs: np.ndarray, scales: np.ndarray, action: float
 ) -> Policy:
-    """The same policy, with other numbers for the same.
+    """The same policy, which has no history, with other numbers for the same.
 
-    Args:
-        policy: its joints in this project's order and signs, without a history.
-        order, signs: in which it counts the joints.
-        scales: by which each of its terms is greater.
-        action: by which its actions are.
+    It counts the joints in this ``order``, with these ``signs``; its terms are greater by
+    ``scales``, its actions by ``action``.
     """
     side, back = policy.sidecar, np.argsort(order)
     ends = np.cumsum([len(term.scale) for term in side.terms])[:-1]

@@ -21,7 +21,7 @@ from benchmarks.command import Jobs, Output, RowsFile, positive, run_sweep
 from benchmarks.probability_fit import Calibration, Sample, calibration, fit_model
 from benchmarks.probability_runs import DRAWN, motion_and_world, seeds, trial
 from benchmarks.validation_set.drawing import TEST, TRAIN
-from controller.cli.common import ExitCode, output, plot_file
+from controller.cli.common import output, plot_file
 from controller.sweeps.summary import rate_interval
 from controller.sweeps.sweep_file import Row
 from go2_wbc.files import write_atomically
@@ -77,8 +77,7 @@ def run(
     counts = len(falls), sum(not row["refused"] for row in found)
     about = {"passed_that_fell": counts, "lost": result.failures}
     values = {"passed": is_ok, **asdict(judged), **about}
-    output.publish(values, render(judged, found, result.failures))
-    return ExitCode.OK if is_ok else ExitCode.FAILED
+    return output.publish(values, render(judged, found, result.failures))
 
 
 def _of_halves(rows: Sequence[Row], *halves: str) -> list[Row]:

@@ -77,10 +77,8 @@ ROWS = (
 def watch(robot: TrialRobot, course: Iterator[float], found: TrialResult) -> None:
     """Follow the course until its end, or until the robot gives up.
 
-    - damped while upright: 1 if the loop went limp at a tilt below 30 deg without calling it a
-      fall;
-    - shares: of the ticks from the start of the trot on;
-    - falls: 1 if the robot fell, for the controller or in truth, within a second of giving up.
+    Damped while upright is a loop that went limp at a tilt below 30 deg without calling it a fall;
+    a fall counts for the controller or in truth, within a second of giving up.
     """
     go2 = robot.go2
     robot.require(go2.stand())

@@ -212,7 +212,7 @@ class Judge:
             self.found["errors"].append(f"{call} in mode {before.value}: {what}")
         wrong, self._second = second.ended(), _Second(self._robot, "")
         if wrong:
-            self.found["hangs" if second.is_alive() else "errors"].append(f"{call}: {wrong}")
+            self.found["hangs" if wrong.endswith("hangs") else "errors"].append(f"{call}: {wrong}")
         has_ended = second.has_begun and call.name in ENDING.get(call.other, ())
         if second.has_begun and call.other == "damp":
             self._is_limp = watch.may_lie = True
@@ -336,9 +336,6 @@ class _Second:
             self.has_begun = True
             self._thread.start()
             self._thread.join(0.005)  # all but damp() end in this tick
-
-    def is_alive(self) -> bool:
-        return self.has_begun and self._thread.is_alive()
 
     def ended(self) -> str:
         """What was wrong with it, when the first call is over."""

@@ -138,10 +138,7 @@ def _trotted(
 
 
 def _note_posture(recorded: TruthRecording, found: TrialResult) -> None:
-    """Mean height and tilt over the last ``REST`` seconds, if worse than what was noted before.
-
-    The height is that of the CoM as the model has it, without the payload: what is asked for.
-    """
+    """Mean height and tilt over the last ``REST`` seconds, if worse than what was noted before."""
     window = recorded.since(recorded.time[-1] - REST)
     found.worsen("height", 1000.0 * abs(com_height(window) - find_profile().stand_height))
     found.worsen("tilt", math.degrees(float(np.abs(window.rpy[:, :2].mean(axis=0)).max())))

@@ -40,12 +40,7 @@ TABLE: Final = {
 
 
 def measure(_trial: Trial, found: TrialResult) -> None:
-    """Three hundred calls, twenty seconds of walking and the demo, with one server.
-
-    Raises:
-        MissingDependency: if ROS 2 is not installed.
-        BridgeError: if the server does not start or stops answering.
-    """
+    """Three hundred calls, twenty seconds of walking and the demo, with one server."""
     from controller.bridges.ros2.demo import run_steps
 
     with joined(), serving(namespace=NAMESPACE):

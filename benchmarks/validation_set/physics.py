@@ -189,5 +189,4 @@ def borders_version(path: Path = BORDERS_FILE) -> str:
 def write_borders(borders: Mapping[str, float | None], path: Path = BORDERS_FILE) -> None:
     """Keep borders, one a line."""
     rows = {name: value and round(value, 4) for name, value in borders.items()}
-    lines = (f"{json.dumps(name)}: {json.dumps(value)}" for name, value in rows.items())
-    write_atomically(path, ("{\n" + ",\n".join(lines) + "\n}\n").encode())
+    write_atomically(path, (json.dumps(rows, indent=0) + "\n").encode())
