@@ -92,18 +92,10 @@ def _ends(tried: TrialRobot, speed: float, time: float) -> dict[str, bool]:
 
 def measure_combined(trial: Trial, found: TrialResult, delay: float, friction: float) -> None:
     """The share of the loads and speeds with which it does not fall."""
-    cases = list(product(LOADS, WALKS))
-    seed = FIRST_SEED + trial.seed
+    cases, seed = list(product(LOADS, WALKS)), FIRST_SEED + trial.seed
+    plant = partial(MujocoPlant, friction=friction, delay=delay, seed=seed, sensors=trial.sensors)
     for load, speed in cases:
-        plant = MujocoPlant(
-            friction=friction,
-            payload=load,
-            delay=delay,
-            sensors=trial.sensors,
-            seed=seed,
-            initial_joint_noise=JOINT_NOISE,
-        )
-        with TrialRobot(plant) as robot:
+        with TrialRobot(plant(payload=load, initial_joint_noise=JOINT_NOISE)) as robot:
             try:
                 set_off(robot, "trot", VelocityCommand(speed))
                 robot.wait(WALK_TIME)

@@ -7,7 +7,6 @@ a robot that lies.
 
 A fall is, in truth, the trunk of a robot that had risen on the ground for ``STUMBLE``, or a tilt of
 60 deg; it counts where the mode said until then that the robot was well. The delay is to the mode.
-An error that a call must not raise ends the benchmark.
 """
 
 import math

@@ -55,10 +55,10 @@ class Line:
         Raises:
             ConfigError: if a metric is missing or has no value.
         """
-        if len(self.metrics) > 1:
+        metric, *more = self.metrics
+        if more:
             cells = [self.bar, *(self._cell(rows, name) if name else "-" for name in self.metrics)]
         else:
-            (metric,) = self.metrics
             found = self._found(rows, metric, "mean", "worst")
             cells = [str(found["n"]), *(self.shown.format(found[key]) for key in ("mean", "worst"))]
         return f"| {' | '.join([self.what, *cells, self.peer])} |"

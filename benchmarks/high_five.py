@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from benchmarks.robots import DIRECTIONS, standing_failure
-from benchmarks.study import Rows, Study, TrialResult
+from benchmarks.study import Study, TrialResult
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.geometry import moving_support_margins
 from go2_wbc.legs import LEGS, SIDES, Leg
@@ -125,15 +125,6 @@ class Impact:
         """Time [s] from one slap to the next."""
         return self.duration + RETURN_TIME + PAUSE
 
-    @property
-    def rows(self) -> Rows:
-        """Directions survived, how far the paw stays off its place, and what the call said."""
-        return (
-            (f"{self.name}.survived", "directions survived, of 6", f">= {len(DIRECTIONS)}"),
-            (f"{self.name}.off", "paw off after 2 s", f"<= {PLACE_TOLERANCE:g} mm"),
-            (f"{self.name}.said", "high_five() said True", ""),
-        )
-
 
 IMPACT_KINDS = (
     Impact("slap", "slap on the held paw, 40 N, 0.1 s", 40.0, 0.1),
@@ -147,9 +138,9 @@ def measure_impacts(trial: Trial, found: TrialResult) -> None:
     A direction is survived by a robot that does not fall until the high five is over, and stands
     then. The call itself may say False, if the slap took the paw below its height.
     """
+    trial = replace(trial, has_nominal_friction=True)
     for kind in IMPACT_KINDS:
-        survived, off, said = (name for name, *_ in kind.rows)
-        trial = replace(trial, has_nominal_friction=True)
+        survived, off, said = (f"{kind.name}.{row}" for row in ("survived", "off", "said"))
         distances, lost, found.values[said] = _hit_all(trial, kind)
         found.values[survived] = float(len(DIRECTIONS) - len(lost))
         if distances:
@@ -213,4 +204,12 @@ def _hits(
 
 
 HELD = Study("high-five", {"high five, either side": HELD_ROWS}, measure_held, "five")
-IMPACTS = Study("slaps", {kind.item: kind.rows for kind in IMPACT_KINDS}, measure_impacts, "")
+IMPACT_ROWS = {
+    kind.item: (
+        (f"{kind.name}.survived", "directions survived, of 6", f">= {len(DIRECTIONS)}"),
+        (f"{kind.name}.off", "paw off after 2 s", f"<= {PLACE_TOLERANCE:g} mm"),
+        (f"{kind.name}.said", "high_five() said True", ""),
+    )
+    for kind in IMPACT_KINDS
+}
+IMPACTS = Study("slaps", IMPACT_ROWS, measure_impacts, "")

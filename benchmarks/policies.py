@@ -188,10 +188,10 @@ def _walk(walk: str, name: str, item: str, bar: str, **how: float) -> Study:
 
 
 def _pushes(walk: str, push: str) -> Study:
+    rows = [("", f"{push} {TROT_PUSHES[push][1]:g} N s survived", ">=")]
     item = f"{walk} at {SPEED:g} m/s, push 0.1 s, 16 phases"
-    table = {item: [("", f"{push} {TROT_PUSHES[push][1]:g} N s survived", ">=")]}
     measure = partial(measure_pushes, walk=walk, push=push)
-    return Study(f"{walk}-{push}", table, measure, group="pushes")
+    return Study(f"{walk}-{push}", {item: rows}, measure, group="pushes")
 
 
 ON_TRUTH = (

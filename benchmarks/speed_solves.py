@@ -17,7 +17,7 @@ from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.state import RobotState, Snapshot
+from go2_wbc.robot.state import Snapshot
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
 from motions import compile_motion
@@ -33,19 +33,18 @@ PLACO_TIME = 43.0
 """Time [us] of PlaCo's tick on two feet on the machine for which bars in us are meant."""
 
 
-def _rows(feet: int) -> tuple[tuple[str, str, str], ...]:
-    return (
-        (f"{feet}.ours", "ours, median", "us"),
-        (f"{feet}.placo", "bare PlaCo, median", "us"),
-        (f"{feet}.faster", "median: times faster", f">= {FASTER[feet]}"),
-        (f"{feet}.ours_p99", "ours, 99 of 100", "us"),
-        (f"{feet}.placo_p99", "bare PlaCo, 99 of 100", "us"),
-        (f"{feet}.tail", "99 of 100: ours by PlaCo's", "<= 1"),
-    )
-
-
 TABLE = {
-    **{f"tick of the QP, {feet} stance feet": _rows(feet) for feet in FASTER},
+    **{
+        f"tick of the QP, {feet} stance feet": (
+            (f"{feet}.ours", "ours, median", "us"),
+            (f"{feet}.placo", "bare PlaCo, median", "us"),
+            (f"{feet}.faster", "median: times faster", f">= {least}"),
+            (f"{feet}.ours_p99", "ours, 99 of 100", "us"),
+            (f"{feet}.placo_p99", "bare PlaCo, 99 of 100", "us"),
+            (f"{feet}.tail", "99 of 100: ours by PlaCo's", "<= 1"),
+        )
+        for feet, least in FASTER.items()
+    },
     "which limits bind, at a trot": (
         ("noted", "multipliers recorded, a tick, scaled", "<= 2 us"),
         ("explained", "`explain()`, scaled", "ms"),
@@ -57,8 +56,7 @@ TABLE = {
 class Tick:
     """What the QP was asked in one tick of a run."""
 
-    state: RobotState  #: measured
-    snapshot: Snapshot  #: of it
+    snapshot: Snapshot  #: of the measured state
     reference: Reference  #: what was asked for
     is_packed: bool  #: whether it came as the row of numbers that the kernel reads
 
@@ -86,7 +84,7 @@ class Recorder(WholeBodyController):
             is_packed = reference._row is not None
             for part in fields(reference):  # a row's arrays are made at their first use
                 getattr(reference, part.name)
-            kept.append(Tick(snapshot.state, snapshot, reference, is_packed))
+            kept.append(Tick(snapshot, reference, is_packed))
         return super().solve(snapshot, reference, relax=relax)
 
 
@@ -97,8 +95,8 @@ def measure_solves(trial: Trial, found: TrialResult) -> None:
     values = found.values
     for feet, ticks in recorded_ticks(trial).items():
         solvers: Mapping[str, Callable[[Tick, Reference], object]] = {
-            "ours": lambda tick, asked: ours.solve(model.snapshot(tick.state), asked),
-            "placo": lambda tick, asked: placo.tick(tick.state, asked),
+            "ours": lambda tick, asked: ours.solve(model.snapshot(tick.snapshot.state), asked),
+            "placo": lambda tick, asked: placo.tick(tick.snapshot.state, asked),
         }
         for name, times in interleaved(ticks, solvers).items():
             values[f"{feet}.{name}"] = float(np.median(times))
@@ -156,8 +154,8 @@ def slowness(trotting: Sequence[Tick]) -> float:
     By PlaCo's tick on two feet: the rest of the machine slows it as it slows us.
     """
     placo = BarePlaco(RobotModel(), WbcConfig())
-    spent = interleaved(trotting, {"placo": lambda tick, asked: placo.tick(tick.state, asked)})
-    return float(np.median(spent["placo"])) / PLACO_TIME
+    solvers = {"placo": lambda tick, asked: placo.tick(tick.snapshot.state, asked)}
+    return float(np.median(interleaved(trotting, solvers)["placo"])) / PLACO_TIME
 
 
 def recorded_ticks(trial: Trial) -> Ticks:

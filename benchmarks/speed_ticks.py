@@ -40,18 +40,17 @@ CALIBRATION_CALLS = 200  # Calls by which a piece of bare work is measured
 GIVEN_UP = 1.0  #: Lag [s] from which on the pace is given up: never in a run that means anything
 
 
-def _tick_rows(mode: str) -> tuple[tuple[str, str, str], ...]:
-    return (
-        (f"{mode}.median", "median", "us"),
-        (f"{mode}.p99", "99 of 100", "us"),
-        (f"{mode}.scaled", "median, scaled", f"<= {TROT_TIME} us" if mode == "trot" else "us"),
-        (f"{mode}.factor", "real-time factor, scaled", f">= {FACTORS[mode]}"),
-    )
-
-
 TICKS = {
     "scale: PlaCo's tick on two feet": (("slowness", "of 43 us", ""),),
-    **{f"whole tick, 2 ms of physics: {mode}": _tick_rows(mode) for mode in FACTORS},
+    **{
+        f"whole tick, 2 ms of physics: {mode}": (
+            (f"{mode}.median", "median", "us"),
+            (f"{mode}.p99", "99 of 100", "us"),
+            (f"{mode}.scaled", "median, scaled", f"<= {TROT_TIME} us" if mode == "trot" else "us"),
+            (f"{mode}.factor", "real-time factor, scaled", f">= {factor}"),
+        )
+        for mode, factor in FACTORS.items()
+    },
 }
 COMMANDS = {
     "60 s of random velocity commands": (

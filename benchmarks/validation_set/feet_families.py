@@ -122,17 +122,18 @@ def _high_five(draw: Draw, s: float) -> Timeline:
 
 def _slide(draw: Draw, s: float) -> Timeline:
     leg, axis = draw.leg(), draw.one_of(("x", "y"))
-    way, z = {axis: s * draw.either(0.02, 0.05)}, draw.between(0.004, 0.012)
-    line = Timeline().foot(leg, **way, z=z, over=draw.between(0.4, 0.8))
+    size, z = s * draw.either(0.02, 0.05), draw.between(0.004, 0.012)
+    x, y = (size, 0.0) if axis == "x" else (0.0, size)
+    line = Timeline().foot(leg, x=x, y=y, z=z, over=draw.between(0.4, 0.8))
     return line.down(leg, over=0.5).home(over=0.8)
 
 
 def _low_pass(draw: Draw, s: float) -> Timeline:
     leg, axis, z = draw.leg(), draw.one_of(("x", "y")), draw.between(0.02, 0.04)
     size, over = s * draw.either(0.04, 0.08), draw.between(0.4, 0.8)
-    line = Timeline().foot(leg, z=z, over=0.4)
-    for way in (size, -size):
-        line = line.foot(leg, **{axis: way}, z=z, over=over)
+    x, y = (size, 0.0) if axis == "x" else (0.0, size)
+    line = Timeline().foot(leg, z=z, over=0.4).foot(leg, x=x, y=y, z=z, over=over)
+    line = line.foot(leg, x=-x, y=-y, z=z, over=over)
     return line.down(leg, over=0.5).home(over=0.8)
 
 

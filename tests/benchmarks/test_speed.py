@@ -51,7 +51,7 @@ def test_placo_is_asked_for_the_same_torques(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(speed_solves, "ROUNDS", 700)
     standing = record(Trial(0))[4][-1]
     model, config = RobotModel(), WbcConfig()
-    tau = BarePlaco(model, config).tick(standing.state, standing.reference)
+    tau = BarePlaco(model, config).tick(standing.snapshot.state, standing.reference)
     ours = WholeBodyController(model).solve(standing.snapshot, standing.reference)
     assert np.abs((tau - ours.tau)[2::3]).max() < KNEE_DIFFERENCE
 
