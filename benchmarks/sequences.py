@@ -23,8 +23,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.behaviour import REAR_END, SIT_PITCH, SIT_REAR_HEIGHT
 from benchmarks.command import Benchmark
-from benchmarks.demo_sequence import REAR_END, SIT_PITCH, SIT_REAR_HEIGHT
 from benchmarks.disturbed import Watch
 from benchmarks.high_five import longest_run
 from benchmarks.robots import plan_of

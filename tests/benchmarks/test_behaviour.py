@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks import robots
-from benchmarks.demo_sequence import StepCheck, failure_of
+from benchmarks.behaviour import StepCheck, failure_of
 from benchmarks.high_five import highest_window, largest_slip, longest_run
 from benchmarks.robots import plant_of
 from controller.demo.steps import DEMO_STEPS, DemoProgress, StepResult

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks import speed, speed_learning, speed_solves, speed_ticks
+from benchmarks import speed, speed_solves, speed_ticks
 from benchmarks.speed_placo import BarePlaco
 from benchmarks.study import chosen_studies
 from controller.sweeps.trials import Trial
@@ -108,7 +108,7 @@ def test_the_motions_are_as_long_as_they_say(seconds: int) -> None:
 
 
 def test_environments_and_a_data_set_are_timed(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, value in (("STEPS", 20), ("ROUNDS", 1), ("MANY", 3), ("MINUTES", 1.0 / 60.0)):
-        monkeypatch.setattr(speed_learning, name, value)
+    for name, value in (("STEPS", 20), ("IN_TURN", 1), ("MANY", 3), ("MINUTES", 1.0 / 60.0)):
+        monkeypatch.setattr(speed, name, value)
     assert min(measured("environments").values()) > 0.0
     assert measured("dataset")["dataset.rows"] == 1000.0
