@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 
 from go2_wbc.brief import counted
@@ -109,7 +110,7 @@ def verdict_of(report: FeasibilityReport) -> Verdict:
         ok=report.ok,
         text=text,
         annotations=_grouped([_annotation(finding, report.series) for finding in findings]),
-        curves=tuple(_curve(item) for item in judged),
+        curves=_curves(judged),
         chance=report.probability,
         world=str(report.world),
     )
@@ -195,26 +196,38 @@ def parts_of(subject: str) -> tuple[str, ...]:
     return tuple(f"{leg}_{place}" for place in places)
 
 
-def _curve(series: Series) -> MarginCurve:
+def _curves(judged: Sequence[Series]) -> tuple[MarginCurve, ...]:
     """Of the least margins of steps, where there are more samples than are shown."""
-    (least, whose), count = series.least, len(series.times)
-    step = -(-count // _MOST_MARGINS)
-    rows = np.arange(0, count, step)
-    if step > 1:
-        best, *others = np.append(least, np.full(-count % step, np.inf)).reshape(-1, step).T
-        after = np.zeros(len(rows), dtype=int)
-        for row, other in enumerate(others, 1):  # half the time of argmin
-            is_less = other < best
-            after[is_less], best = row, np.minimum(best, other)
-        rows += after
-    margin = least[rows]
+    found = dict[int, MarginCurve]()
+    for count in {len(item.times) for item in judged}:  # of one length all at once
+        rows = [row for row, item in enumerate(judged) if len(item.times) == count]
+        step = -(-count // _MOST_MARGINS)
+        steps = np.full((len(rows), -(-count // step) * step), np.inf)
+        for own, row in zip(steps, rows, strict=True):
+            own[:count] = judged[row].least[0]
+        best, *others = steps.reshape(len(rows), -1, step).transpose(2, 0, 1).copy()
+        at = np.zeros(best.shape, dtype=int)
+        for after, other in enumerate(others, 1):  # half the time of argmin
+            at[other < best] = after
+            best = np.minimum(best, other)
+        best[np.isinf(best)] = np.nan
+        at += np.arange(0, count, step)
+        found |= {
+            row: _curve(judged[row], *pair) for row, *pair in zip(rows, best, at, strict=True)
+        }
+    return tuple(found[row] for row in range(len(judged)))
+
+
+def _curve(
+    series: Series, margin: Float[np.ndarray, " n"], rows: Int[np.ndarray, " n"]
+) -> MarginCurve:
     return MarginCurve(
         name=series.check,
         unit=series.unit,
         time=series.times[rows],
-        margin=np.where(np.isinf(margin), np.nan, margin),
+        margin=margin,
         subjects=series.subjects,
-        worst=whose[rows],
+        worst=series.least[1][rows],
         tight=series.tight,
     )
 

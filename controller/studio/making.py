@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import final
 
-from controller.studio.orders import LONGEST_RUN, Order
+from controller.studio.orders import LONGEST_RUN, Order, Task
 from go2_wbc.curves import Ease
 from go2_wbc.errors import StudioError
 from motions import Motion, Timeline
@@ -73,6 +73,8 @@ class Maker:
         which = order.path, made.motion.name
         if which not in self._is_random:
             self._is_random[which] = _moves(made.line) != _moves(self._made(order).line)
+        if order.task is Task.DRAFT:  # which tells no notes
+            return made
         notes = [RANDOM] if self._is_random[which] else []
         if made.line.end > LONG and not rests(made.line):
             notes.append(WHOLE)
@@ -102,7 +104,7 @@ class Maker:
         A module that is from elsewhere stays so.
         """
         found, others, start = dict[str, int](), self._others[folder], f"{folder}{os.sep}"
-        for name in [name for name in sys.modules if name not in others]:
+        for name in sys.modules.keys() - others:
             file = getattr(sys.modules[name], "__file__", None) or ""
             if file.startswith(start) and not PACKAGES & {*(path := Path(file)).parts}:
                 found[name] = path.stat().st_mtime_ns if path.exists() else 0

@@ -60,7 +60,7 @@ def resistance(case: forces.Case) -> tuple[Float[np.ndarray, "n 6"], Float[np.nd
     damps its errors [1/s], on average over the motion.
     """
     motion, world, count = case.path, case.world, len(case.path.times)
-    rows = np.unique(np.append(np.arange(0, count, EVERY), count - 1))
+    rows = np.array([*range(0, count - 1, EVERY), count - 1])
     v, a = motion.v[rows, 6:], motion.a[rows, 6:]
     rest = forces.joint_friction(v, world) - WbcConfig().joint_friction.torque(v, a)
     asked = np.hstack([motion.q[rows, 3:], motion.stance[rows], rest])

@@ -74,15 +74,16 @@ class _Places:
     """Where calls end that run; by the codes' identities: one hashes all that is written in it."""
 
     def __init__(self) -> None:
-        self._known = dict[int, tuple[CodeType, list[tuple[int, int]]]]()
+        self._known = dict[int, tuple[CodeType, list[Any]]]()
 
     def end_of(self, frame: FrameType) -> tuple[int, int]:
         """Line and column at which the call ends that a frame is at."""
         code = frame.f_code
         if id(code) not in self._known:
-            ends = [(end or 0, column or 0) for _, end, _, column in code.co_positions()]
-            self._known[id(code)] = code, ends  # it is kept: no other one gets its place
-        return self._known[id(code)][1][frame.f_lasti // 2]
+            places = [*code.co_positions()]
+            self._known[id(code)] = code, places  # it is kept: no other one gets its place
+        _, end, _, column = self._known[id(code)][1][frame.f_lasti // 2]
+        return end or 0, column or 0
 
 
 @contextmanager

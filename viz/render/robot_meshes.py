@@ -7,12 +7,12 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import final
+from typing import NamedTuple, final
 
 import coal
 import numpy as np
 import pinocchio as pin
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 
 from go2_wbc.legs import FOOT_NAMES
@@ -36,9 +36,9 @@ _POSE = 7  # numbers of a configuration before those of the joints
 _BLACK_LIFT = 34 / 255  # least value of a colour: pure black would show no shape
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class RobotVisuals:
-    """Everything that is drawn of the robot."""
+    """Everything that is drawn of the robot; equal to itself only."""
 
     meshes: dict[str, tuple[Surface, ...]]
     """The surfaces of each mesh file in its own frame, one for each colour, by its path."""
@@ -181,25 +181,52 @@ class PosedRobot:
         pin.framesForwardKinematics(self._model, self._data, q)
         return np.array([self._data.oMf[frame].translation for frame in self._foot_frames])
 
-    def feet_along(self, q: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 4 3"]:
-        """What ``feet`` says of every configuration, to a micrometre."""
-        model, places = self._model, np.empty((len(q), 4, 3))
-        base = Rotation.from_quat(q[:, 3:7]).as_matrix().transpose(1, 2, 0).copy()
-        joints = np.ascontiguousarray(q.T[_POSE:], dtype=np.float32)  # a tenth of the time
-        sines, cosines = np.sin(joints), np.cos(joints)
-        for leg, frame in enumerate(self._foot_frames):
-            foot = model.frames[frame]
-            p = foot.placement.translation[:, None]
-            for joint in model.supports[foot.parentJoint].tolist()[:1:-1]:
-                T, row = model.jointPlacements[joint], model.idx_qs[joint] - _POSE
-                # About a unit axis with the cross product K: 1 + sin K + (1 - cos) K^2 (Rodrigues).
-                K = pin.skew(np.ravel(model.joints[joint].createData().S)[3:])
-                p, across, back = (T.rotation @ turn @ p for turn in (np.eye(3), K, K @ K))
-                p = p + sines[row] * across + (1.0 - cosines[row]) * back + T.translation[:, None]
-            places[:, leg] = q[:, :3] + (base * p).sum(axis=1).T
-        return places
-
     def on_trunk(self, points: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
         """Points of the base frame in the world [m], in the configuration placed last."""
         T_world_base = self._data.oMi[1]
         return points @ T_world_base.rotation.T + T_world_base.translation
+
+
+def feet_along(visuals: RobotVisuals, q: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 4 3"]:
+    """What ``PosedRobot.feet`` says of every configuration, to a micrometre."""
+    legs, single = _legs_of(visuals), np.float32  # half the time, of sines a tenth
+    base = Rotation.from_quat(q[:, 3:7]).as_matrix().transpose(1, 2, 0).astype(single, order="C")
+    joints = np.ascontiguousarray(q.T[_POSE:], dtype=single)
+    sines, cosines, p = np.sin(joints), np.cos(joints), legs.p_feet
+    for rows, turns, places in legs.joints:
+        both = turns @ p
+        p = both[:, :3] + places + sines[rows] * both[:, 3:6] + (1.0 - cosines[rows]) * both[:, 6:]
+    found = np.empty((len(q), 4, 3))
+    for leg, own in enumerate(p):
+        found[:, leg] = q[:, :3] + (base * own).sum(axis=1).T
+    return found
+
+
+class _Legs(NamedTuple):
+    """The joints of the four legs side by side, from the calves to the hips."""
+
+    p_feet: Float[np.ndarray, "4 3 1"]  #: in the frames of the calves [m]
+    joints: list[
+        tuple[Int[np.ndarray, "4 1"], Float[np.ndarray, "4 9 3"], Float[np.ndarray, "4 3 1"]]
+    ]
+    """Rows of the joints; the turns that are there, across and back (Rodrigues: about a unit axis
+    with the cross product K a joint turns by 1 + sin K + (1 - cos) K^2); where they are [m]."""
+
+
+@functools.cache
+def _legs_of(visuals: RobotVisuals) -> _Legs:
+    model, found = visuals.model, []
+    feet = [model.frames[model.getFrameId(name)] for name in FOOT_NAMES]
+    chains = [model.supports[foot.parentJoint].tolist()[:1:-1] for foot in feet]
+    for row in zip(*chains, strict=True):
+        placed = [model.jointPlacements[joint] for joint in row]
+        axes = (np.ravel(model.joints[joint].createData().S)[3:] for joint in row)
+        turn, K = (
+            np.array([T.rotation for T in placed]),
+            np.array([pin.skew(axis) for axis in axes]),
+        )
+        turns = np.concatenate([turn, turn @ K, turn @ K @ K], axis=1).astype(np.float32)
+        places = np.array([T.translation for T in placed], np.float32)[:, :, None]
+        found.append((np.array([[model.idx_qs[joint] - _POSE] for joint in row]), turns, places))
+    p_feet = np.array([foot.placement.translation for foot in feet], np.float32)
+    return _Legs(p_feet[:, :, None], found)

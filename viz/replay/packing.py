@@ -22,6 +22,7 @@ _ALIGNMENT = 8  # [bytes] typed arrays in a browser must start at a multiple of 
 _QUANTISED_LEVELS = 65535  # of an unsigned 16-bit number
 _LENGTH = 4  # [bytes] of the header's length
 _LEAST_SAME = 64  # bytes; less is not worth a line of the table
+_BEGINNING = 64  # [bytes] by which most arrays are told apart
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,7 @@ class Pack:
         self._blobs: list[bytes] = []
         self._entries: dict[str, dict[str, object]] = {}
         self._places: dict[str, tuple[int, int]] = {}
-        self._known: dict[bytes, int] = {}
+        self._starts: dict[tuple[int, bytes], list[tuple[int, int]]] = {}
         self._size = 0
 
     def add(
@@ -48,24 +49,33 @@ class Pack:
     ) -> None:
         """Store an array of one of the types that a browser knows; ``extra`` is told with it."""
         blob = np.ascontiguousarray(array).tobytes()
-        kind = _kind(array.dtype)
-        start = self._known.setdefault(blob, self._size)
-        entry = {"type": kind, "shape": array.shape, "offset": start}
+        start = self._start_of(blob)
+        entry = {"type": _kind(array.dtype), "shape": array.shape, "offset": start}
         self._entries[name] = {**entry, **(extra or {})}
         if start == self._size:
             self._places[name] = start, start + len(blob)
-            blob += b"\0" * (-len(blob) % _ALIGNMENT)
-            self._blobs.append(blob)
-            self._size += len(blob)
+            padding = b"\0" * (-len(blob) % _ALIGNMENT)
+            self._blobs += [blob, padding]
+            self._size += len(blob) + len(padding)
+
+    def _start_of(self, blob: bytes) -> int:
+        """Where an equal one is, or this one will be; to hash all of it would take longer."""
+        alike = self._starts.setdefault((len(blob), blob[:_BEGINNING]), [])
+        for start, place in alike:
+            if self._blobs[place] == blob:
+                return start
+        alike.append((self._size, len(self._blobs)))
+        return self._size
 
     def add_quantised(self, name: str, array: Shaped[np.ndarray, "n k"]) -> None:
         """Store each column as 16-bit numbers between its own extremes."""
-        low = array.min(axis=0, initial=0.0)
-        span = np.maximum(array.max(axis=0, initial=0.0) - low, 1e-9)
-        levels = array - low  # and in place: most of the time is that of new memory
-        levels /= span
-        levels *= _QUANTISED_LEVELS
-        levels = np.round(levels, out=levels).astype(np.uint16)
+        columns = np.array(array.T, float, order="C")  # extremes of rows take a tenth of the time
+        low = columns.min(axis=1, initial=0.0)
+        span = np.maximum(columns.max(axis=1, initial=0.0) - low, 1e-9)
+        columns -= low[:, None]  # in place: most of the time is that of new memory
+        columns /= span[:, None]
+        columns *= _QUANTISED_LEVELS
+        levels = np.rint(columns, out=columns).astype(np.uint16).T
         scale = span / _QUANTISED_LEVELS
         self.add(name, levels, {"low": low.tolist(), "scale": scale.tolist()})
 

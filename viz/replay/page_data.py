@@ -38,7 +38,7 @@ from viz.content import ReplayContent, Verdict, checked_content
 from viz.render.camera import smoothed
 from viz.render.ground import COLORS, grid_of
 from viz.render.mesh import Surface
-from viz.render.robot_meshes import PosedRobot, RobotVisuals, visuals_of
+from viz.render.robot_meshes import RobotVisuals, feet_along, visuals_of
 from viz.replay.packing import Pack, Packed, compressed_text
 from viz.style import FORCE, INK, LEG_COLORS
 
@@ -282,8 +282,7 @@ def replay_frames(recording: Recording) -> tuple[float, dict[str, np.ndarray]]:
     rows = np.minimum(np.searchsorted(recording.time, wanted - 0.25 / rate), last)
     rows[-1] = last
     visuals, q = visuals_of(recording), _continuous(recording.q[rows])
-    robot = PosedRobot(visuals)
-    feet = robot.feet_along(q)
+    feet = feet_along(visuals, q)
     heights = feet[:, :, 2].mean(axis=1) - visuals.foot_radius
     heights = heights if len(recording.ground) else np.zeros(count)
     below = np.interp(recording.time, wanted, heights)

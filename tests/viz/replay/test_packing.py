@@ -71,3 +71,12 @@ def test_arrays_that_are_equal_are_stored_once() -> None:
     assert len(data) < 10_000
     _, arrays = read_pack(data)
     assert all(np.array_equal(arrays[f"{k}"], times) for k in range(5))
+
+
+def test_arrays_that_only_begin_alike_are_each_stored() -> None:
+    times, pack = np.arange(1000.0), Pack()
+    others = [np.where(times < 1000 - k, times, -times) for k in range(5)]
+    for k, other in enumerate(others):
+        pack.add(f"{k}", other)
+    _, arrays = read_pack(pack.packed({}).data)
+    assert all(np.array_equal(arrays[f"{k}"], other) for k, other in enumerate(others))
