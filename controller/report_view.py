@@ -251,4 +251,9 @@ def _in_motion_frame(run: Recording, model: RobotModel) -> Recording:
     q = run.q.copy()
     q[:, :3] = turn.apply(q[:, :3] - anchor.p_world)
     q[:, 3:7] = (turn * Rotation.from_quat(q[:, 3:7])).as_quat()
-    return replace(run, q=q, p_world_com=turn.apply(run.p_world_com - anchor.p_world))
+    return replace(
+        run,
+        q=q,
+        p_world_com=turn.apply(run.p_world_com - anchor.p_world),
+        ground=(run.ground - anchor.p_world) @ turn.as_matrix().T,
+    )

@@ -14,6 +14,7 @@ from typing import final
 
 from controller.studio import bars, exports, worlds
 from controller.studio.edits import PALETTE, cut_of, edited, run_of, site_of
+from controller.studio.grounds import Ground, ground_of
 from controller.studio.library import library
 from controller.studio.orders import AT_ONCE, Answer, Bar, Cut, Doing, Order, Task
 from controller.studio.plain import NO_WAY
@@ -80,7 +81,7 @@ class Studio:
         """
         self._project, self._values = Project(path), dict[str, Value]()
         self._lock, self.motion = threading.RLock(), motion
-        self._doing, self._world = dict[str, Doing](), World()
+        self._doing, self._world, self._ground = dict[str, Doing](), World(), Ground()
         self._runner, self._player = Runner(), Runner()
         self._is_solved = self._is_looking = True  # all that jumps in what is saved; for what does
         self._is_away = False  # the file, when it was looked at last
@@ -263,15 +264,15 @@ class Studio:
         return {}
 
     def meet(self, order: Mapping[str, object]) -> dict[str, object]:
-        """Check and play in another world from now on: ``friction``, ``payload``, ``sensors``."""
+        """Check and play in another world from now on, on another ground: see ``worlds``."""
         with self._lock:
-            before = self._world
+            before = self._world, self._ground
             try:
-                self._world = worlds.world_of(order)
+                self._world, self._ground = worlds.world_of(order), ground_of(order)
                 shown = self._run(self._project.saved, longest=LONGEST_SOLVE)
                 self._server.publish(self._content(shown), shown.title)
             except StudioError as error:
-                self._world = before
+                self._world, self._ground = before
                 return {"error": str(error)}
         return {}
 
@@ -446,6 +447,7 @@ class Studio:
             is_shown=longest > 0.0 and (data == self._project.saved or not self._is_solved),
             is_looked_for=self._is_looking,
             world=self._world,
+            ground=self._ground,
         )
 
     def _told_of(self, which: str, doing: Doing | None) -> None:
@@ -477,7 +479,7 @@ class Studio:
             "songs": songs_beside(self._project.path),
             "exports": exports.EXPORTS,
             "notes": shown.notes,
-            "world": worlds.shown(self._world),
+            "world": worlds.shown(self._world, self._ground),
             "words": WORDS,
             "lanes": ["trunk", *(leg.name for leg in LEGS), "robot", "time"],
         }

@@ -15,6 +15,8 @@ from multiprocessing.connection import Connection
 from multiprocessing.synchronize import Event
 from typing import TYPE_CHECKING, final
 
+from controller.studio import worlds
+from controller.studio.grounds import Ground
 from controller.studio.literals import Run
 from controller.studio.orders import (
     AT_ONCE,
@@ -125,7 +127,7 @@ def serve(pipe: Connection, stop: Event) -> None:
         maker, jumps = Maker(), Jumps(teller)
         if order is None:
             checked = jumps.checker.evaluate(Timeline().body(z=-0.01, over=0.2))
-            _played(checked, jumps.checker, World(), teller)
+            _played(checked, jumps.checker, World(), Ground(), teller)
         pipe.send("loaded")
         while True:
             if order is not None:
@@ -172,7 +174,7 @@ def _answer(
             return Answer(motion.name)
         checked = jumps.evaluate(line, order)
         if order.task is Task.PLAY:
-            content, told = _played(checked, jumps.checker, order.world, teller)
+            content, told = _played(checked, jumps.checker, order.world, order.ground, teller)
         else:
             content, told = planned(checked), ""
     except (Go2WbcError, SystemExit) as error:
@@ -185,7 +187,7 @@ def _answer(
     from viz.replay.page_data import prepared
 
     sliders = tuple(slider(item, values.get(item.name, item.default)) for item in motion.parameters)
-    content = plainly(replace(content, sliders=sliders))
+    content = plainly(replace(worlds.judged(content, order.ground), sliders=sliders))
     bars = tuple(_bars(order, source, made.marks, content))
     shown = content if order.task is Task.EXPORT else prepared(content)
     is_solved = not is_unsolved(content)
@@ -193,7 +195,11 @@ def _answer(
 
 
 def _played(
-    checked: CheckedMotion, checker: FeasibilityChecker, world: World, teller: Teller
+    checked: CheckedMotion,
+    checker: FeasibilityChecker,
+    world: World,
+    ground: Ground,
+    teller: Teller,
 ) -> tuple[ReplayContent, str]:
     """The motion in MuJoCo, in the world that it was checked for, and how that went."""
     from controller.go2_controller import GO2Controller
@@ -204,7 +210,7 @@ def _played(
     from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 
     with (
-        closing(GroundTruth(plant_in_world(world))) as truth,
+        closing(GroundTruth(plant_in_world(world, terrain=ground.terrain))) as truth,
         GO2Controller(plant=truth) as go2,
     ):
         is_ready = go2.sit() if checked.plan.entry is Posture.SIT else go2.stand()
@@ -212,10 +218,13 @@ def _played(
             raise StudioError(f"the robot did not get ready: {go2.last_outcome.reason}")
         with teller.watching(go2, checked.plan.duration):
             result = measure_motion(go2, truth, checked.plan, checker.model)
-        content = performed(checked, go2.recording(), checker.model)
+        run = go2.recording()
+    run = replace(run, ground=ground.cells(run.q[:, :2]))
+    content = performed(checked, run, checker.model)
     why = result.fall or result.reason
     share = f"{100 * result.torque:.0f} % of the torque, {100 * result.speed:.0f} % of the speed"
-    where = "" if world == World() else f" ({world})"
+    where = worlds.told(world, ground)
+    where = "" if (world, ground) == (World(), Ground()) else f" ({where})"
     done = f"played in MuJoCo{where}: done, {share}"
     return content, done if result.ok else f"NOT done{where}: {why}"
 

@@ -1,12 +1,21 @@
-"""The world that the page has chosen: a motion is checked and played in it."""
+"""The world that the page has chosen: a motion is checked in it, and played there, on its ground.
+
+The page asks for it by ``friction``, ``payload``, ``sensors``; and ``ground``, ``size``.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
+from controller.studio import grounds
+from controller.studio.grounds import Ground
 from go2_wbc.errors import ConfigError, StudioError
 from go2_wbc.world import RANGES, SENSORS, World
+
+if TYPE_CHECKING:
+    from viz.content import ReplayContent
 
 NUMBERS = ("friction", "payload")
 
@@ -30,12 +39,26 @@ def world_of(order: Mapping[str, object]) -> World:
         raise StudioError(str(error).replace("World.", "")) from error
 
 
-def shown(world: World) -> dict[str, object]:
+def told(world: World, ground: Ground) -> str:
+    """What a motion is played in, in words."""
+    return ", ".join(filter(None, (str(world), str(ground))))
+
+
+def judged(content: ReplayContent, ground: Ground) -> ReplayContent:
+    """It with a verdict that says what ground it is of, where physics plays on another one."""
+    if content.verdict is None or ground == Ground():
+        return content
+    verdict = replace(content.verdict, world=f"{content.verdict.world}, level ground")
+    return replace(content, verdict=verdict)
+
+
+def shown(world: World, ground: Ground) -> dict[str, object]:
     """As the page needs it, with what may be chosen."""
     return {
         **{name: getattr(world, name) for name in (*NUMBERS, "sensors")},
-        "told": str(world),
-        "is_usual": world == World(),
+        **grounds.shown(ground),
+        "told": told(world, ground),
+        "is_usual": (world, ground) == (World(), Ground()),
         "ranges": {name: RANGES[name] for name in NUMBERS},
         "choices": SENSORS,
     }

@@ -9,6 +9,7 @@ import numpy as np
 from go2_wbc.plant.base import Plant
 from go2_wbc.plant.mujoco.model import JointDynamics
 from go2_wbc.plant.mujoco.plant import MujocoPlant
+from go2_wbc.plant.terrain import Terrain
 from go2_wbc.world import World
 
 __all__ = ["MujocoPlant", "Plant", "plant_in_world"]
@@ -20,6 +21,7 @@ def plant_in_world(
     seed: int = 0,
     initial_yaw: float = 0.0,
     initial_joint_noise: float = 0.0,
+    terrain: Terrain | None = None,
     mjcf: Path | None = None,
     keyframe: str | None = None,
     visuals: bool = False,
@@ -30,7 +32,7 @@ def plant_in_world(
         world: what is uncertain in it is drawn.
         seed: of that, and of every other random number of the plant.
         initial_yaw, initial_joint_noise: heading and spread of the joints at the start [rad].
-        mjcf, keyframe, visuals: as of ``MujocoPlant``; a file's joints are as it says.
+        terrain, mjcf, keyframe, visuals: as of ``MujocoPlant``; a file's joints are as it says.
     """
     own = world.sample(np.random.default_rng(seed))
     return MujocoPlant(
@@ -44,6 +46,7 @@ def plant_in_world(
         seed=seed,
         initial_yaw=initial_yaw,
         initial_joint_noise=initial_joint_noise,
+        terrain=terrain,
         mjcf=mjcf,
         keyframe=keyframe,
         visuals=visuals,

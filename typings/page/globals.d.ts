@@ -68,6 +68,10 @@ interface Editor {
     is_usual: boolean;
     ranges: Record<string, [number, number]>;
     choices: string[];
+    ground: string; size: number;
+    /** That the verdict is of level ground, where it is played on another. */
+    warning: string;
+    grounds: Record<string, { size: string; unit: string; range: [number, number] }>;
   };
 }
 

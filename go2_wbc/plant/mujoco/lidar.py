@@ -130,6 +130,10 @@ class DepthConfig:
         return rays / np.linalg.norm(rays, axis=1, keepdims=True)
 
 
+SKY, DOWN = (
+    20.0,
+    np.array((0.0, 0.0, -1.0)),
+)  #: From where [m] the ground is looked at, and where to
 PLACE = np.array((0.30, 0.0, -0.03))  #: Of the lidar, in the base frame [m]
 
 
@@ -140,6 +144,19 @@ def ground_model(terrain: Terrain | None) -> mujoco.MjModel:
     if terrain is not None:
         add_terrain(spec, terrain, 1.0)
     return spec.compile()
+
+
+def heights_of(
+    terrain: Terrain | None, places: Float[np.ndarray, "n 2"]
+) -> Float[np.ndarray, " n"]:
+    """Heights [m] of the ground at places x, y [m]; of steep sides that of their upper edge."""
+    model = ground_model(terrain)
+    data, hit, found = mujoco.MjData(model), np.zeros((1, 1), np.int32), np.empty(len(places))
+    mujoco.mj_forward(model, data)
+    for row, place in enumerate(places):
+        top = np.append(place, SKY)
+        found[row] = SKY - mujoco.mj_ray(model, data, top, DOWN, None, True, -1, hit)
+    return found
 
 
 def chosen(

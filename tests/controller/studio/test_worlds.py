@@ -18,6 +18,7 @@ from motions import FeasibilityChecker
 from motions.registry import load_text
 from tests.viz.page_reader import read_message, read_pack
 from viz.content import Verdict
+from viz.replay.page_data import UNKNOWN
 
 TURN = '''"""Turns."""
 
@@ -32,6 +33,7 @@ def turn() -> Timeline:
 '''
 ICE: dict[str, object] = {"friction": 0.2, "payload": 3.0, "sensors": "imu"}
 CLOSE = 1e-6  #: Of a chance: what is kept is kept by numbers that are rounded to 1e-7
+SLOPE_ERROR = 0.02  #: Of a rise: feet press into the ground, and the trunk's attitude is felt
 FORCE_ERROR = 2.0  #: N, of what the feet bear, on average over a motion that ends as it began
 
 
@@ -121,6 +123,39 @@ def test_physics_plays_it_in_that_world(studio: Studio) -> None:
     assert not np.array_equal(felt["q"], loaded["q"]), "it does not know the truth"
     told, _ = _played(studio, friction=0.1)
     assert told.startswith("NOT done (friction 0.1): fell")
+
+
+def test_on_another_ground_verdict_and_chance_stay_and_say_that_they_are_of_a_level_one(
+    studio: Studio, file: Path
+) -> None:
+    before = _header(studio)
+    assert studio.meet({"ground": "stairs", "size": 0.05}) == {}
+    header = _header(studio)
+    world, verdict = header["editor"]["world"], header["verdict"]
+    assert (world["ground"], world["size"], world["is_usual"]) == ("stairs", 0.05, False)
+    assert world["told"] == "friction 0.5, stairs, step 0.05 m"
+    assert "are those of level ground" in world["warning"]
+    assert verdict == {**before["verdict"], "world": "friction 0.5, level ground"}
+    told = str(studio.meet({"ground": "stairs", "size": 2.0})["error"])
+    assert told == "step must be between 0.01 and 0.2 m, got 2"
+    assert _header(studio) == header, "what is refused changes nothing"
+    assert studio.meet({}) == {}
+    assert _header(studio)["verdict"] == before["verdict"]
+    assert file.read_text(encoding="utf-8") == TURN
+
+
+@pytest.mark.slow
+def test_physics_plays_it_on_that_ground_which_is_drawn_below_its_feet(studio: Studio) -> None:
+    _, level = _played(studio)
+    assert "ground" not in level
+    told, sloping = _played(studio, ground="slope", size=8.0)
+    assert told.startswith("played in MuJoCo (friction 0.5, slope, angle 8 deg): done")
+    feet = sloping["feet"].reshape(-1, 4, 3)[0]
+    ahead, behind = feet[:2].mean(axis=0), feet[2:].mean(axis=0)
+    (way, _, rise) = ahead - behind
+    assert rise / way == pytest.approx(np.tan(np.radians(8.0)), abs=SLOPE_ERROR)
+    heights = sloping["ground"][sloping["ground"] > UNKNOWN]
+    assert np.ptp(heights) > 100, "millimetres"
 
 
 @pytest.mark.parametrize(

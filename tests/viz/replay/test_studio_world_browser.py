@@ -47,8 +47,16 @@ def test_a_world_is_chosen_with_keys_and_stays_as_the_page_is_loaded_again(
     tab.wait_for("window.studio && replay.version")
     assert tab.text("#world summary") == told
     tab.click("#world summary")
+    tab.page.get_by_label("Ground").select_option("stairs")
+    tab.wait_for("document.querySelector('#world-warning').textContent.includes('level ground')")
+    assert tab.text("#world summary") == f"{told}, stairs, step 0.08 m"
+    assert tab.text("#chance p:last-child") == "friction 0.2, level ground", "it knows no sensors"
+    tab.page.get_by_label("Step").fill("0.05")
+    press("Enter")
+    tab.wait_for("document.querySelector('#world summary').textContent.endsWith('step 0.05 m')")
     do(tab, "studio.world.usual.click()")
     tab.wait_for("document.querySelector('#world summary').textContent === 'World: friction 0.5'")
     assert tab.text("#badge").startswith("feasible")
-    assert tab.evaluate("studio.world.usual.disabled")
+    assert tab.evaluate("studio.world.usual.disabled && studio.world.size.hidden")
+    assert tab.text("#world-warning") == ""
     assert file.read_text(encoding="utf-8") == TURN

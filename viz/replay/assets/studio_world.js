@@ -15,7 +15,8 @@ class World {
   constructor(studio) {
     this.studio = studio;
     this.fields = {};
-    const { ranges, choices } = studio.player.data.header.editor.world;
+    const { world } = studio.player.data.header.editor;
+    const { ranges, choices } = world;
     this.box = element("details", { id: "world" });
     this.told = element("summary", { title: "Verdict, margins, chance and physics are those of this world; click to change it (W)" });
     const row = element("div", { className: "buttons" });
@@ -29,23 +30,33 @@ class World {
     const list = element("select", { title: "What the robot feels when physics plays it; the check knows no sensors" });
     list.append(...choices.map((word) => new Option(FEELS[word] ?? word, word)));
     row.append(this.field("sensors", "Feels", list));
+    const grounds = element("select", { title: "What physics plays it on; the check knows level ground only" });
+    grounds.append(...["level", ...Object.keys(world.grounds)].map((word) => new Option(word, word)));
+    row.append(this.field("ground", "Ground", grounds));
+    this.size = this.field("size", "", element("input", { type: "number" }));
+    row.append(this.size);
+    grounds.addEventListener("change", () => this.meet({ ...this.chosen(), size: null })); // the usual one of it
     this.usual = element("button", { textContent: "As usual", title: "The usual world again" });
     this.usual.addEventListener("click", () => this.meet({}));
     row.append(this.usual);
-    this.box.append(this.told, row);
+    this.warning = element("p", { id: "world-warning" });
+    this.box.append(this.told, row, this.warning);
   }
 
   field(name, title, input, unit = "") {
     const label = element("label");
     label.append(`${title} `, input, unit && ` ${unit}`);
-    input.addEventListener("change", () => this.meet(this.chosen()));
+    if (name !== "ground") input.addEventListener("change", () => this.meet(this.chosen()));
     this.fields[name] = input;
     return label;
   }
 
   chosen() {
-    const { friction, payload, sensors } = this.fields;
-    return { friction: Number(friction.value), payload: Number(payload.value), sensors: sensors.value };
+    const { friction, payload, sensors, ground, size } = this.fields;
+    return {
+      friction: Number(friction.value), payload: Number(payload.value), sensors: sensors.value,
+      ground: ground.value, size: Number(size.value),
+    };
   }
 
   /** @param {Editor} editor */
@@ -54,6 +65,19 @@ class World {
     this.usual.disabled = world.is_usual;
     this.told.classList.toggle("other", !world.is_usual);
     for (const [name, input] of Object.entries(this.fields)) input.value = String(world[name]);
+    this.warning.textContent = world.warning;
+    this.useGround(world);
+  }
+
+  // Its number has another name, unit and range on each ground; a level one has none.
+  /** @param {Editor["world"]} world */
+  useGround({ ground, grounds }) {
+    const kind = grounds[ground];
+    this.size.hidden = !kind;
+    if (!kind) return;
+    const { size, unit, range: [low, high] } = kind;
+    Object.assign(this.fields.size, { min: low, max: high, step: unit === "deg" ? 1 : 0.01, title: `${low} to ${high} ${unit}` });
+    this.size.replaceChildren(`${size[0].toUpperCase()}${size.slice(1)} `, this.fields.size, ` ${unit}`);
   }
 
   open() {
@@ -63,7 +87,7 @@ class World {
   }
 
   // The file stays as it is: only what is checked and played is another world.
-  /** @param {Record<string, number | string>} order */
+  /** @param {Record<string, number | string | null>} order */
   async meet(order) {
     const { studio } = this;
     studio.tools.offer([]);
