@@ -19,6 +19,7 @@ from controller.cli.common import (
     Numbers,
     ProgressLine,
     dds_domain,
+    folder,
     output,
     print_json,
     print_json_line,
@@ -40,6 +41,9 @@ def ros2(
     realtime: Annotated[bool, "at the pace of the wall clock"] = False,
     viewer: Annotated[bool, "open MuJoCo's window"] = False,
     sensors: Annotated[str, SENSORS, "what its state comes from"] = "ideal",
+    motions: Annotated[
+        Path | None, "FOLDER", "whose saved motions and plans play_motion plays, too", folder
+    ] = None,
     config: Numbers = None,
 ) -> int:
     """Serve a Go2 in MuJoCo under the whole-body controller as a ROS 2 node, until Ctrl-C.
@@ -51,11 +55,14 @@ def ros2(
         go2-wbc ros2                                 as fast as it can, with /clock
         go2-wbc ros2 --realtime --namespace robot2   a second robot
         go2-wbc ros2 --realtime --sensors imu        odometry as a robot has it
+        go2-wbc ros2 --realtime --motions plans      also plays plans/greet.plan, by its name
     """
     from controller.bridges.ros2.server import ServerSettings, serve
+    from controller.bridges.saved_motions import SavedMotions
 
     logging.getLogger("controller").setLevel(logging.INFO)
-    settings = ServerSettings(namespace, realtime, viewer, config, sensors)
+    saved = SavedMotions(motions)
+    settings = ServerSettings(namespace, realtime, viewer, config, sensors, saved)
     serve(settings, _until_signal(), lambda text: print(text, file=sys.stderr, flush=True))
     return ExitCode.OK
 
@@ -113,7 +120,8 @@ def unitree_drive(
     steps: Annotated[
         tuple[str, ...],
         "STEP",
-        f"of stand, sit, trot, high_five, lie_down; default {' '.join(STEPS)}",
+        "of stand, sit, trot, high_five, lie_down, or a saved FILE.json or FILE.plan; default"
+        f" {' '.join(STEPS)}",
     ] = STEPS,
     speed: Annotated[float, "M/S", "of the trot"] = 0.5,
     seconds: Annotated[float, "S", "of the trot"] = 4.0,
@@ -131,6 +139,8 @@ def unitree_drive(
     Examples:
         go2-wbc unitree-drive --interface lo --domain 1 --i-have-the-remote-in-hand
         go2-wbc unitree-drive --interface eth0 --json --i-have-the-remote-in-hand
+        go2-wbc unitree-drive --interface lo --domain 1 --i-have-the-remote-in-hand
+            --steps stand greet.plan lie_down    a motion of your own, saved
     """
     from controller.arguments import config as read_config
     from controller.bridges.unitree.drive import Trot, check_steps, drive

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 from typing import Final
 
 import viz
@@ -20,13 +21,26 @@ EXPORTS: Final[Mapping[str, str]] = {
     "npz": "NumPy trajectory",
     "json": "JSON motion",
     "plan": "Plan",
+    "ros2": "ROS 2 plan",
+    "unitree": "Unitree plan",
     "test": "Test for pytest",
 }
 """What each kind is called on the page; its first letter is the key that chooses it in the list."""
 PICTURES: Final = ("html", "webp", "mp4")  #: Kinds that are made of what the page shows
 FPS: Final = {".webp": 12.5, ".mp4": 25.0}
 """Pictures a second: a WebP of more is too large, or too coarse."""
-_THEN: Final = {"json": "go2-wbc run", "plan": "go2-wbc run", "test": "pytest"}
+_THEN: Final = {
+    "json": "go2-wbc run {0}",
+    "plan": "go2-wbc run {0}",
+    "ros2": "go2-wbc ros2 --realtime --motions .",
+    "unitree": "go2-wbc unitree-drive --interface lo --domain 1 --i-have-the-remote-in-hand"
+    " --steps stand {0} lie_down",
+    "test": "pytest {0}",
+}
+_BRIDGES: Final = {  # what else is told of a plan that a bridge plays
+    "ros2": ", which play() of GO2ControllerNode then plays by its name",
+    "unitree": ", for go2-wbc unitree-sim; of a robot the interface is another, and the domain 0",
+}
 _TEST: Final = '''"""Can the robot do ``{motion}``? Run: pytest test_{motion}.py"""
 
 from pathlib import Path
@@ -42,13 +56,15 @@ def test_the_robot_can_do_{motion}(check_motion):
 
 def beside(file: Path, motion: str, kind: str) -> Path:
     """Where an export of a motion lies."""
-    return file.with_name(f"test_{motion}.py" if kind == "test" else f"{motion}.{kind}")
+    ending = "plan" if kind in _BRIDGES else kind
+    return file.with_name(f"test_{motion}.py" if kind == "test" else f"{motion}.{ending}")
 
 
 def answer(path: Path, kind: str, *, is_new: bool = True) -> dict[str, object]:
     """What the page tells of a file, with the command ``then`` that takes it, if there is one."""
     told = f"wrote {path.name}" if is_new else f"{path.name} is there already, and stays"
-    then = {"then": f"{_THEN[kind]} {path.name}"} if kind in _THEN else {}
+    told += _BRIDGES.get(kind, "")
+    then = {"then": _THEN[kind].format(quote(path.name))} if kind in _THEN else {}
     return {"told": told, "file": path.name, **then}
 
 

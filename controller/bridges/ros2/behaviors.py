@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+from controller.bridges.saved_motions import SavedMotions, is_saved
 from controller.go2_controller import GO2Controller
 from controller.jobs import Job, JobServer, Reply
 from controller.modes import Aborted, Measurements, Mode, Outcome
-from go2_wbc.errors import Go2WbcError, unknown_name
+from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
 from go2_wbc.motion_plan import MotionPlan, Posture
-from motions import find_motion
+from motions import Timeline, find_motion
 from motions.authoring import parse_values
 
+NONE_SAVED = SavedMotions()  #: Only motions of the library
 STOP, DAMP = "stop", "damp"
 ORDERS: Mapping[str, Callable[[GO2Controller], bool]] = {
     "sit": lambda go2: go2.sit(),
@@ -79,12 +81,21 @@ def _measured(go2: GO2Controller, act: Callable[[GO2Controller], bool]) -> Measu
     return outcome.measured if is_new else {}
 
 
-def motion_job(motion: str, settings: Sequence[str], go2: GO2Controller, reply: Reply) -> Job:
-    """The job that goes to where a motion starts and plays it."""
+def motion_job(
+    motion: str,
+    settings: Sequence[str],
+    go2: GO2Controller,
+    reply: Reply,
+    saved: SavedMotions = NONE_SAVED,
+) -> Job:
+    """The job that goes to where a motion of the library, or a ``saved`` one, starts and plays it.
+
+    It is aborted for what is unknown, damaged, or more than the robot can do, before it moves.
+    """
     plans: list[MotionPlan] = []
 
     def prepare() -> None:
-        plans.append(go2.prepare(find_motion(motion)(**parse_values(settings))))
+        plans.append(go2.prepare(_meant(motion, settings, saved)))
 
     def play(job: Job) -> bool:
         (plan,) = plans
@@ -94,6 +105,14 @@ def motion_job(motion: str, settings: Sequence[str], go2: GO2Controller, reply: 
         return go2.play(plan, check=False)
 
     return Job(motion, lambda job: _measured(go2, lambda _go2: play(job)), reply, prepare)
+
+
+def _meant(motion: str, settings: Sequence[str], saved: SavedMotions) -> Timeline | MotionPlan:
+    if not is_saved(motion):
+        return find_motion(motion)(**parse_values(settings))
+    if settings:
+        raise CommandError(f"{motion}: a saved motion has no parameters, got {', '.join(settings)}")
+    return saved.read(motion)
 
 
 def _take_entry(go2: GO2Controller, plan: MotionPlan) -> bool:

@@ -33,10 +33,11 @@ from controller import arguments
 from controller.bridges import ros2
 from controller.bridges.ros2 import MOTION_ACTION
 from controller.bridges.ros2 import imports as ros
-from controller.bridges.ros2.behaviors import COMMANDS, Jobs, motion_job, order
+from controller.bridges.ros2.behaviors import COMMANDS, NONE_SAVED, Jobs, motion_job, order
 from controller.bridges.ros2.namespace_lock import GraphWatch, lock_namespace
 from controller.bridges.ros2.states import StatePublisher
 from controller.bridges.ros2.velocity import VelocityInput
+from controller.bridges.saved_motions import SavedMotions
 from controller.go2_controller import GO2Controller
 from controller.jobs import Job, JobServer, Reply
 from controller.modes import Outcome
@@ -51,8 +52,8 @@ FEEDBACK_PERIOD = 0.1  #: Time [s] between two messages of how far a motion has 
 class MotionActions:
     """Offers ``play_motion`` of a job server's robot."""
 
-    def __init__(self, context: Any, namespace: str, jobs: Jobs) -> None:
-        self._jobs = jobs
+    def __init__(self, context: Any, namespace: str, jobs: Jobs, saved: SavedMotions) -> None:
+        self._jobs, self._saved = jobs, saved
         self._node = ros.Node(
             "go2_wbc_motions", namespace=namespace, context=context, start_parameter_services=False
         )
@@ -87,7 +88,7 @@ class MotionActions:
     def _execute(self, handle: Any) -> Any:
         goal, answered = handle.request, concurrent.futures.Future[Outcome]()
         go2, reply = self._jobs.robot, answered.set_result
-        self._jobs.submit(motion_job(goal.motion, goal.settings, go2, reply))
+        self._jobs.submit(motion_job(goal.motion, goal.settings, go2, reply, self._saved))
         while not concurrent.futures.wait([answered], FEEDBACK_PERIOD).done:
             if handle.is_cancel_requested:  # again and again: one that came early gets lost
                 self._jobs.cancel()
@@ -139,6 +140,7 @@ class ServerSettings:
     viewer: bool = False  #: open MuJoCo's window
     config: Config | Path | None = None  #: numbers of the engine, or a TOML file
     sensors: str = "ideal"  #: of the simulated robot, as of ``MujocoPlant``
+    saved: SavedMotions = NONE_SAVED  #: motions that can be played besides those of the library
 
 
 def serve(
@@ -216,7 +218,7 @@ class RobotNode:
         self._node = node = ros.Node(
             ros2.SERVER_NODE, namespace=namespace, context=context, start_parameter_services=False
         )
-        self._jobs = JobServer(go2)
+        self._jobs, self._saved = JobServer(go2), settings.saved
         self._velocity = VelocityInput(go2, config.cautious_envelope, config.pose)
         self._poll_twists = polled_topic(node, ros.Twist, ros2.CMD_VEL, self._take_twist)
         self._poll_poses = polled_topic(node, ros.Pose, "body_pose", self._take_pose)
@@ -232,7 +234,9 @@ class RobotNode:
         self._states = StatePublisher(
             node, simulator, realtime=settings.realtime, sensors=settings.sensors
         )
-        self._actions = ros.PlayMotion and MotionActions(context, namespace, self._jobs)
+        self._actions = ros.PlayMotion and MotionActions(
+            context, namespace, self._jobs, self._saved
+        )
         self._pacer = Pacer(simulator.control_period, LATE) if settings.realtime else None
         self._throttle, self._errors = LogThrottle(_log), 0
         self._cpu, self._began = 0.0, time.monotonic()
@@ -253,6 +257,9 @@ class RobotNode:
         if ros.RobotBehaviorCommand is None:
             names = ", ".join(f"/{namespace}/{name}" for name in COMMANDS)
             lines.append(f"std_srvs/Trigger services instead: {names}")
+        if self._saved.folder is not None and ros.PlayMotion is not None:
+            found = ", ".join(self._saved.names) or "none yet"
+            lines.append(f"motions that are saved in {self._saved.folder}: {found}")
         return "\n".join(lines)
 
     # --- the loop -------------------------------------------------------------------------

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import fmean
 from typing import Final
 
+from controller.bridges.saved_motions import is_saved, read_saved
 from controller.bridges.unitree.plant import UnitreePlant
 from controller.go2_controller import GO2Controller
 from go2_wbc.config import Config
 from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
 from go2_wbc.validation import FINITE, POSITIVE, ranged
+from motions import FeasibilityChecker
 
 SETTLE: Final = 1.5  #: Time [s] of a trot before its speed is measured
 SAMPLE: Final = 0.02  #: Time [s] between two samples of the speed
@@ -38,10 +41,18 @@ class Step:
 
 
 def check_steps(names: list[str]) -> None:
-    """Raise CommandError for an unknown step; lists the valid ones."""
+    """Read and check what is to be driven, before the robot is asked for anything.
+
+    Raises:
+        CommandError: for an unknown step; lists the valid ones.
+        MotionFileError: for a saved motion that cannot be used.
+        MotionInfeasible: for one that the robot cannot do; carries the findings.
+    """
     for name in names:
-        if name not in STEPS:
-            raise CommandError(unknown_name("step", name, STEPS))
+        if is_saved(name):
+            FeasibilityChecker().plan(read_saved(Path(name)))
+        elif name not in STEPS:
+            raise CommandError(unknown_name("step", name, (*STEPS, "FILE.json", "FILE.plan")))
 
 
 def drive(
@@ -58,7 +69,7 @@ def drive(
 
 def _do(go2: GO2Controller, name: str, trot: Trot) -> Step:
     try:
-        ok = STEPS[name](go2)
+        ok = go2.play(name) if is_saved(name) else STEPS[name](go2)
         error = _trot(go2, trot) if ok and name == "trot" else None
     except Go2WbcError as failure:
         return Step(name, False, str(failure))

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from controller.bridges.saved_motions import SavedMotions
+from controller.bridges.unitree import drive, plant
+from controller.cli import bridges
 from controller.cli.main import main
 from controller.studio.exports import EXPORTS
 from controller.studio.session import Studio
@@ -77,6 +82,33 @@ def test_a_saved_motion_and_a_plan_are_played_by_the_command_that_is_told(
         assert answer["then"] == f"go2-wbc run nod.{kind}"
         plan = checker.plan(load(file.with_name(f"nod.{kind}")))
         assert (plan.name, plan.duration) == ("nod", pytest.approx(1.0, abs=0.3))
+
+
+def test_what_is_told_of_a_plan_for_a_bridge_is_a_command_that_takes_it(
+    studio: Studio, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen, check = list[object](), drive.check_steps
+    robot = SimpleNamespace(close=lambda: None)
+    monkeypatch.setattr(plant, "UnitreePlant", lambda *given, **_: seen.append(given) or robot)
+    monkeypatch.setattr(drive, "check_steps", lambda names: seen.append(names) or check(names))
+    monkeypatch.setattr(drive, "drive", lambda *_: iter(()))
+    monkeypatch.setattr(bridges, "_until_signal", lambda: None)
+    server = SimpleNamespace(  # without ROS
+        ServerSettings=lambda *given: given, serve=lambda given, *_: seen.append(given[-1])
+    )
+    monkeypatch.setitem(sys.modules, "controller.bridges.ros2.server", server)
+    monkeypatch.chdir(file.parent)
+    for kind, part in (("ros2", "plays by its name"), ("unitree", "the domain 0")):
+        answer = studio.export({"kind": kind, "again": True})
+        assert answer["file"] == "nod.plan"
+        assert part in str(answer["told"])
+        program, *arguments = shlex.split(str(answer["then"]))
+        assert program == "go2-wbc"
+        assert main(arguments) == 0
+    saved, *driven = seen
+    assert isinstance(saved, SavedMotions)
+    assert saved.read("nod.plan").name == "nod"
+    assert driven == [["stand", "nod.plan", "lie_down"], ("lo", 1)]
 
 
 def test_a_film_without_its_extra_is_told_of_before_the_work(

@@ -1,0 +1,72 @@
+"""Saved motions that a bridge plays: files of numbers, never code.
+
+Over a network they are asked for by their names in one folder, which is named where the bridge is
+started; nothing else of the machine can be named.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import final
+
+from go2_wbc.errors import CommandError, unknown_name
+from motions import CompiledPlan, Timeline, load_plan
+from motions.saved.files import read_motion
+
+MOTION, PLAN = ".json", ".plan"  #: Endings of what ``save_motion`` and ``save_plan`` write
+
+
+def is_saved(name: str) -> bool:
+    """Whether ``name`` is that of a saved motion or plan, by its ending."""
+    return name.endswith((MOTION, PLAN))
+
+
+def read_saved(file: Path) -> Timeline | CompiledPlan:
+    """What is saved in a file.
+
+    Raises:
+        MotionFileError: if it is missing, damaged, or not what this project has written.
+    """
+    return load_plan(file) if file.suffix == PLAN else read_motion(file)
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class SavedMotions:
+    """Those of one folder.
+
+    Attributes:
+        folder: that they lie in, not below it; None for none.
+    """
+
+    folder: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Raise CommandError for what is no folder."""
+        if self.folder is not None and not self.folder.is_dir():
+            raise CommandError(f"{self.folder} is no folder")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the files that are there now; links to other folders are not among them."""
+        if self.folder is None:
+            return ()
+        home = self.folder.resolve()
+        found = (file for file in home.iterdir() if is_saved(file.name) and file.is_file())
+        return tuple(sorted(file.name for file in found if file.resolve().parent == home))
+
+    def read(self, name: str) -> Timeline | CompiledPlan:
+        """The one of this name.
+
+        Raises:
+            CommandError: for an unknown name; lists the valid ones.
+            MotionFileError: for a file that is damaged.
+        """
+        if self.folder is None:
+            raise CommandError(
+                "no folder of saved motions was named at the start: --motions FOLDER"
+            )
+        if name not in (names := self.names):
+            raise CommandError(unknown_name("saved motion", f"{name:.80}", names))
+        return read_saved(self.folder / name)
