@@ -55,7 +55,7 @@ def ros2(
         go2-wbc ros2                                 as fast as it can, with /clock
         go2-wbc ros2 --realtime --namespace robot2   a second robot
         go2-wbc ros2 --realtime --sensors imu        odometry as a robot has it
-        go2-wbc ros2 --realtime --motions plans      also plays plans/greet.plan, by its name
+        go2-wbc ros2 --realtime --motions plans      also plays plans/greet.plan
     """
     from controller.bridges.ros2.server import ServerSettings, serve
     from controller.bridges.saved_motions import SavedMotions
