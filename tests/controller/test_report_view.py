@@ -82,7 +82,8 @@ def test_a_run_is_seen_in_the_frame_and_at_the_time_of_its_motion(
     nod: CheckedMotion, checker: FeasibilityChecker
 ) -> None:
     plan = nod.recording()
-    content = performed(nod, _elsewhere(plan), checker.model)
+    run = _elsewhere(plan)
+    content = performed(nod, replace(run, ground=run.p_world_com), checker.model)
     own = content.recording
     assert not content.is_plan
     assert content.ghost is not None
@@ -91,6 +92,8 @@ def test_a_run_is_seen_in_the_frame_and_at_the_time_of_its_motion(
     np.testing.assert_allclose(own.time[rows], plan.time, atol=_ROUNDING)
     np.testing.assert_allclose(own.q[rows], plan.q, atol=_ROUNDING)
     np.testing.assert_allclose(own.p_world_com[rows], plan.p_world_com, atol=_ROUNDING)
+    ground = own.ground[run.labels.index(nod.plan.name) :][: len(own.time)]
+    np.testing.assert_allclose(ground, own.p_world_com, atol=_ROUNDING)
     np.testing.assert_allclose(content.ghost.q, plan.q)
     assert own.duration == pytest.approx(plan.duration + 1.0, abs=0.02)
     assert own.labels[0] == plan.labels[0]
