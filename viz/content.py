@@ -158,6 +158,7 @@ class ReplayContent:
         verdict: what to say about the motion.
         ghost: the plan of what was measured, shown translucent; its clock starts with the
             recording's, and the verdict is on it.
+        proposal: the verdict on the ghost, where that is another motion, proposed in its place.
         written: what was written, where the plan is only the nearest to it; shown translucent in
             another colour. Of its forces, torques and margins nothing is shown.
         beats: instants [s] that the motion counts in, drawn as a ruler.
@@ -173,6 +174,7 @@ class ReplayContent:
     is_plan: bool = False
     verdict: Verdict | None = None
     ghost: Recording | None = None
+    proposal: Verdict | None = None
     written: Recording | None = None
     beats: tuple[float, ...] = ()
     sliders: tuple[Slider, ...] = ()

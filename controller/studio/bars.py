@@ -2,11 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 
 from controller.studio.orders import Bar
 from controller.studio.source import Slot, parameters
+from go2_wbc.curves import Ease
+from go2_wbc.legs import LEGS
+from go2_wbc.motion_plan import Posture
+from motions.language.body_and_feet import POSES
+from motions.language.steps import STEP_GAITS
+
+WORDS: Mapping[str, Sequence[str]] = {
+    "leg": [leg.name for leg in LEGS],
+    "ease": [ease.value for ease in Ease],
+    "frame": ["ground", "body"],
+    "gait": list(STEP_GAITS),
+    "pose.name": list(POSES),
+    "joint": ["hip", "thigh", "calf"],
+    "posture.stance": [posture.name for posture in Posture],
+}
+"""Words that arguments may be, of all calls or of one; others can be written in the file."""
 
 _BAR = tuple(field.name for field in fields(Bar))
 _SLOT = tuple(field.name for field in fields(Slot) if field.name != "is_choice")

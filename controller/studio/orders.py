@@ -37,6 +37,7 @@ class Task(Enum):
     EXPORT = "export"  #: check, and have all of the content, not only what the page needs
     PLAY = "play"  #: in MuJoCo, beside the plan
     MEND = "mend"  #: look for changes that make it possible
+    NEAREST = "nearest"  #: look for the nearest motion that is possible
     WRITE = "write"  #: to a file: itself, its plan or its trajectory
     REWRITE = "rewrite"  #: make two calls of one, or write out what is computed
 
@@ -73,7 +74,7 @@ class Order:
 class Doing:
     """How far the process has got, told while it works."""
 
-    what: str  #: "loading", "solving" or "playing"
+    what: str  #: "loading", "solving", "nearing" (the nearest motion) or "playing"
     done: float = 0.0  #: time [s] that was solved for, or of the motion that was played
     whole: float = 0.0  #: of so many seconds
 

@@ -6,13 +6,13 @@ import hashlib
 import logging
 import secrets
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import final
 
-from controller.studio import bars, exports, worlds
+from controller.studio import bars, exports, songs, worlds
 from controller.studio.edits import PALETTE, cut_of, edited, run_of, site_of
 from controller.studio.grounds import Ground, ground_of
 from controller.studio.library import library
@@ -22,18 +22,14 @@ from controller.studio.project import Project
 from controller.studio.proposals import proposal, read
 from controller.studio.rewriting import offers
 from controller.studio.running import Runner
+from controller.studio.searching import most
 from controller.studio.shows import with_show
-from controller.studio.songs import heard, songs_beside
 from controller.studio.source import Source
 from controller.studio.together import copied, edited_together, pasted
-from go2_wbc.curves import Ease
 from go2_wbc.errors import Go2WbcError, StudioError, unknown_name
 from go2_wbc.legs import LEGS
-from go2_wbc.motion_plan import Posture
 from go2_wbc.world import World
 from motions.authoring import Value
-from motions.language.body_and_feet import POSES
-from motions.language.steps import STEP_GAITS
 from viz.content import ReplayContent
 from viz.replay.page_data import Prepared
 from viz.replay.preview_server import PreviewServer
@@ -45,17 +41,7 @@ LONGEST_SOLVE, LONGEST_TRY = 6.0, 3.0
 """Processor time [s] that a jump which the page asks for is solved for, and one of those that are
 tried for the most that can be done: own choice. Of 17 jumps that the robot can do the slowest took
 2.3 s; none that took longer than 5 s passed the check."""
-FINEST = 0.01, 1.0  #: How near [m, deg] to the most that can be done it is looked for
-WORDS: Mapping[str, Sequence[str]] = {
-    "leg": [leg.name for leg in LEGS],
-    "ease": [ease.value for ease in Ease],
-    "frame": ["ground", "body"],
-    "gait": list(STEP_GAITS),
-    "pose.name": list(POSES),
-    "joint": ["hip", "thigh", "calf"],
-    "posture.stance": [posture.name for posture in Posture],
-}
-"""Words that arguments may be, of all calls or of one; others can be written in the file."""
+LONGEST_NEAREST = 20.0  #: The same of the nearest motion: what the solver gives one part of it
 
 
 @final
@@ -87,6 +73,8 @@ class Studio:
         self._is_away = False  # the file, when it was looked at last
         self._changes: tuple[str, ...] = ()
         self._copied: tuple[str, ...] = ()
+        self._proposed: tuple[bytes, bytes] | None = None  # what was saved, and the nearest to it
+        self._is_idle_work = False  # what the process that plays does ends with the next edit
         self._motions: tuple[str, ...] = ()
         self._bars: tuple[Bar, ...] = ()
         try:
@@ -105,11 +93,12 @@ class Studio:
                     "/choose": self.choose,
                     "/world": self.meet,
                     "/library": lambda _: library(),
-                    "/music": self.music,
+                    "/music": partial(songs.music, self._project.path),
                     "/play": self.play,
                     "/cancel": self.cancel,
                     "/highest": self.highest,
                     "/mend": self.mend,
+                    "/nearest": self.nearest,
                     "/export": self.export,
                 },
             )
@@ -150,12 +139,12 @@ class Studio:
 
         Args:
             order: see ``edited_together``; besides ``op`` "undo" and "redo", "saved" (a draft is
-                given up), "change" (see ``mend``), "offers" (what there is to be done for a bar, by
-                ``site`` and ``number``) and "split" (it, at a ``time``), "show" (a motion that
-                plays all others), and "paste" behind ``site`` what ``copy`` has taken; "write_out"
-                a ``bar``, by its place, "read" the file that it is of. Of an order that is
-                ``proposed`` what it would change in the text is told. ``base`` is the state of the
-                file that the page knows, ``has`` the version that it shows, ``commit`` to save.
+                given up), "change" (see ``mend``), "nearest" (see it), "offers" (what there is to
+                do for a bar, by ``site`` and ``number``) and "split" (it, at a ``time``), "show" (a
+                motion that plays all others), and "paste" behind ``site`` what ``copy`` has taken;
+                "write_out" a ``bar``, by its place, "read" the file that it is of. Of an order that
+                is ``proposed`` what it would change in the text is told. ``base`` is the state of
+                the file that the page knows, ``has`` the version that it shows, ``commit`` to save.
 
         Returns:
             What the page shows next, see ``PreviewServer.answer``; of what was saved the ``site``
@@ -183,6 +172,8 @@ class Studio:
                 return {"error": str(error)}
 
     def _done(self, order: Mapping[str, object]) -> dict[str, object] | bytes:
+        if self._is_idle_work:
+            self._player.stop()
         if (op := order.get("op")) in HISTORY:
             (self._project.undo if op == "undo" else self._project.redo)()
             self.show()
@@ -214,6 +205,10 @@ class Studio:
             return pasted(source, order, self._copied)
         if order.get("op") in ("split", "write_out"):
             return self._rewritten(order)
+        if order.get("op") == "nearest":
+            if self._proposed is None or self._proposed[0] != source.data:
+                raise StudioError("that was the nearest to another motion: look for it again")
+            return Source(self._proposed[1])
         if order.get("op") != "change":
             motion = self.motion or ""
             return edited_together(
@@ -276,17 +271,6 @@ class Studio:
                 return {"error": str(error)}
         return {}
 
-    def music(self, order: Mapping[str, object]) -> dict[str, object]:
-        """The beats and the sound of ``name``, one of the sound files beside the motion's."""
-        path, name = self._project.path, order.get("name")
-        songs = songs_beside(path)
-        if not isinstance(name, str) or name not in songs:
-            return {"error": unknown_name("song", str(name), songs)}
-        try:
-            return heard(path.with_name(name))
-        except Go2WbcError as error:
-            return {"error": str(error)}
-
     def play(self, order: Mapping[str, object]) -> dict[str, object] | bytes:
         """The motion as it is saved, in MuJoCo beside the plan; or why it could not be played."""
         try:
@@ -308,25 +292,11 @@ class Studio:
         It is looked for between that and what is saved, in the process that plays: edits go on.
         """
         source, known = Source(self._project.saved), self._bars
+        full, motion = self._with_callers(order), self.motion or ""
         try:
-            full = self._with_callers(order)
-            site, run, asked = site_of(order.get("site")), run_of(full), order.get("value")
-            found = [one for one in source.slots(site, run) if one.name == order.get("name")]
-            low = found[0].value if found else 0.0
-            if not isinstance(asked, int | float) or not isinstance(low, int | float):
-                raise StudioError("only of a number there is a most")
-            index = [(bar.site, bar.number) for bar in known].index((site, run.number))
-            step, best, high = FINEST[bool(found) and found[0].is_angle], None, float(asked)
-            while abs(high - low) > 1.5 * step:
-                middle = round(step * round(0.5 * (low + high) / step), 2)
-                after = edited(source, {**full, "op": "set", "value": middle}, self.motion or "")
-                if self._can_do(after.data, index):
-                    best = low = middle
-                else:
-                    high = middle
+            return {"highest": most(source, full, known, motion, self._can_do)}
         except (StudioError, ValueError) as error:
             return {"error": str(error)}
-        return {"highest": best}
 
     def _can_do(self, data: bytes, index: int) -> bool:
         """Whether the robot can do a call of a text, in as long as is tried."""
@@ -342,6 +312,26 @@ class Studio:
             return {"error": str(error)}
         self._changes = tuple(call for call, _ in found)
         return {"changes": found}
+
+    def nearest(self, order: Mapping[str, object]) -> dict[str, object] | bytes:
+        """The nearest motion that the robot can do as a ghost of what is saved, or why none is.
+
+        With how far it is, and the "diff" of ``op`` "nearest". The next edit ends the search.
+        """
+        data = self._project.saved
+        self._is_idle_work = True
+        try:
+            shown = self._run(data, Task.NEAREST, longest=LONGEST_NEAREST)
+            if shown.text is None:
+                raise StudioError(f"no motion near to yours in {LONGEST_NEAREST:g} s of work")
+        except StudioError as error:
+            return {"error": str(error)}
+        finally:
+            self._is_idle_work = False
+        self._proposed = data, shown.text[0]
+        told = proposal(Source(data), Source(shown.text[0]), self.motion or "")
+        told["told"] = shown.told
+        return self._server.answer(told, self._content(shown), shown.title, order.get("has"))
 
     def export(self, order: Mapping[str, object]) -> dict[str, object]:
         """Write what is saved beside the file: ``kind`` is one of ``EXPORTS``.
@@ -476,11 +466,11 @@ class Studio:
             "undo": self._project.can_undo,
             "redo": self._project.can_redo,
             "palette": list(PALETTE),
-            "songs": songs_beside(self._project.path),
+            "songs": songs.songs_beside(self._project.path),
             "exports": exports.EXPORTS,
             "notes": shown.notes,
             "world": worlds.shown(self._world, self._ground),
-            "words": WORDS,
+            "words": bars.WORDS,
             "lanes": ["trunk", *(leg.name for leg in LEGS), "robot", "time"],
         }
         self._motions = shown.motions

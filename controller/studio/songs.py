@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+
+from go2_wbc.errors import Go2WbcError, unknown_name
 
 SUFFIXES = (".wav", ".mp3", ".ogg", ".flac")  #: Of files that are offered
 PEAK_RATE = 100  #: Bars of the waveform a second
@@ -27,6 +30,17 @@ def sound_of(path: Path) -> bytes:
     from motions.music.songs import mp3_of, read_sound
 
     return mp3_of(read_sound(path))
+
+
+def music(file: Path, order: Mapping[str, object]) -> dict[str, object]:
+    """The beats and the sound of the song of this ``name`` beside a file, or why there are none."""
+    name, known = order.get("name"), songs_beside(file)
+    if not isinstance(name, str) or name not in known:
+        return {"error": unknown_name("song", str(name), known)}
+    try:
+        return heard(file.with_name(name))
+    except Go2WbcError as error:
+        return {"error": str(error)}
 
 
 def heard(path: Path) -> dict[str, object]:

@@ -38,8 +38,8 @@ from go2_wbc.world import World
 if TYPE_CHECKING:
     from controller.go2_controller import GO2Controller
     from controller.studio.jumping import Jumps
-    from controller.studio.making import Maker
-    from motions import CheckedMotion, FeasibilityChecker
+    from controller.studio.making import Made, Maker
+    from motions import CheckedMotion, FeasibilityChecker, Timeline
     from motions.language.tracing import CallMark
     from viz.content import ReplayContent
 
@@ -56,10 +56,13 @@ class Teller:
     def __init__(self, pipe: Connection, stop: Event) -> None:
         self._pipe, self._stop = pipe, stop
         self._longest, self._since, self._told = 0.0, 0.0, math.inf  # nothing before an order
+        self._what = "solving"
 
-    def begin(self, longest: float) -> None:
-        """Take up an order, in which each jump may be solved for ``longest`` [s]."""
-        self._longest, self._told = longest, 0.0
+    def begin(self, order: Order) -> None:
+        """Take up an order: how long each jump, or the nearest motion, may be solved for."""
+        self._longest, self._told = order.longest, 0.0
+        self._what = "nearing" if order.task is Task.NEAREST else "solving"
+        self._since = time.thread_time()
 
     @property
     def _is_stopped(self) -> bool:
@@ -70,10 +73,10 @@ class Teller:
         from motions.dynamics.solver import BUDGET
 
         now = time.thread_time()
-        if iterations <= 1:
+        if iterations <= 1 and self._what == "solving":
             self._since = now
         if self._longest != AT_ONCE:
-            self.tell(Doing("solving", now - self._since, self._longest or BUDGET))
+            self.tell(Doing(self._what, now - self._since, self._longest or BUDGET))
         if self._is_stopped:
             raise StudioError(STOPPED)
         if 0.0 < self._longest < now - self._since:
@@ -131,7 +134,7 @@ def serve(pipe: Connection, stop: Event) -> None:
         pipe.send("loaded")
         while True:
             if order is not None:
-                teller.begin(order.longest)
+                teller.begin(order)
                 answer = _answer(order, jumps, maker, pipe, teller)
                 pipe.send(answer)
                 if order.task is Task.EXPORT and isinstance(answer, Answer) and answer.content:
@@ -146,6 +149,7 @@ def _answer(
 ) -> Answer | StudioError:
     from controller.motion_files import write_motion
     from controller.report_view import planned, slider
+    from controller.studio.nearness import beside
     from controller.studio.writing_out import written_out
     from motions import suggest
 
@@ -172,9 +176,13 @@ def _answer(
         if order.out is not None:
             write_motion(line, order.out, jumps.checker)
             return Answer(motion.name)
-        checked = jumps.evaluate(line, order)
+        checked, text = jumps.evaluate(line, order), None
         if order.task is Task.PLAY:
             content, told = _played(checked, jumps.checker, order.world, order.ground, teller)
+        elif order.task is Task.NEAREST:
+            after, near = _nearest(source, order, made, maker)
+            content, told = beside(checked, jumps.checker.evaluate(near))
+            text = after.data, None
         else:
             content, told = planned(checked), ""
     except (Go2WbcError, SystemExit) as error:
@@ -191,7 +199,22 @@ def _answer(
     bars = tuple(_bars(order, source, made.marks, content))
     shown = content if order.task is Task.EXPORT else prepared(content)
     is_solved = not is_unsolved(content)
-    return Answer(motion.name, shown, bars, made.names, told, made.notes, is_solved=is_solved)
+    more = {"text": text, "is_solved": is_solved}
+    return Answer(motion.name, shown, bars, made.names, told, made.notes, **more)
+
+
+def _nearest(source: Source, order: Order, made: Made, maker: Maker) -> tuple[Source, Timeline]:
+    """The text that asks for the nearest motion, and what it makes."""
+    from controller.studio.nearness import asking
+    from motions.language.timeline_data import NEAREST
+
+    found: list[Timeline] = []
+
+    def does_ask(after: Source) -> bool:
+        found.append(maker.make(replace(order, data=after.data)).line)
+        return found[-1].physics == NEAREST
+
+    return asking(source, made.motion.name, does_ask), found[-1]
 
 
 def _played(

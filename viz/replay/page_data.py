@@ -242,6 +242,7 @@ def prepared(content: ReplayContent | Prepared) -> Prepared:
         "has_sound": bool(content.sound),
         "sliders": [asdict(slider) for slider in content.sliders],
         "verdict": None,
+        "proposal": None,
         "ghost": None,
         "ground": None,
         "written": None,
@@ -257,8 +258,9 @@ def prepared(content: ReplayContent | Prepared) -> Prepared:
         header["ground"] = {**place, "low": float(np.nanmin(grid.z)), "colors": COLORS}
     if content.sound:
         pack.add("sound", np.frombuffer(content.sound, np.uint8))
-    if verdict is not None:
-        header["verdict"] = _add_verdict(pack, verdict)
+    for name, one in (("verdict", verdict), ("proposal", content.proposal)):
+        if one is not None:
+            header[name] = _add_verdict(pack, one, "" if one is verdict else f"{name}.")
     for name, other in (("ghost", content.ghost), ("written", content.written)):
         if other is not None:
             header[name] = _add_frames(pack, f"{name}.", *replay_frames(other))
@@ -335,12 +337,12 @@ def _binding(spans: tuple[Span, ...], gap: float) -> list[tuple[float, float, st
     return [(start, end, label) for start, end, label in joined]
 
 
-def _add_verdict(pack: Pack, verdict: Verdict) -> dict[str, object]:
+def _add_verdict(pack: Pack, verdict: Verdict, prefix: str) -> dict[str, object]:
     curves = []
     for k, curve in enumerate(verdict.ranked()):
-        pack.add(f"curve{k}.time", curve.time.astype(np.float32))
-        pack.add(f"curve{k}.margin", curve.margin.astype(np.float32))
-        pack.add(f"curve{k}.worst", curve.worst.astype(np.uint8))
+        pack.add(f"{prefix}curve{k}.time", curve.time.astype(np.float32))
+        pack.add(f"{prefix}curve{k}.margin", curve.margin.astype(np.float32))
+        pack.add(f"{prefix}curve{k}.worst", curve.worst.astype(np.uint8))
         words = {"name": curve.name, "unit": curve.unit, "subjects": curve.subjects}
         curves.append({**words, "tight": float(curve.tight)})
     return {
@@ -358,7 +360,8 @@ HTML_SUFFIXES = (".html", ".htm")
 PAGE_LIMIT = 4_000_000  #: Largest page [bytes]
 _SCRIPTS = "data stage scene ghost steps flags charts binding trust verdict sound app"
 _EDITOR = (
-    "words view tracks inspector proposals hands onion library music world tools doing tour page"
+    "words view tracks inspector proposals nearest hands onion library music world tools doing "
+    "tour page"
 )
 """Of the assets, in the order in which they need one another; a live page has another one, and one
 that edits those of the studio."""

@@ -45,7 +45,8 @@ class Player {
     for (const name of Object.keys(GHOST_COLORS)) classList.toggle(`has-${name}`, data[name] !== null);
     document.getElementById("force-key").textContent = isPlan ? "planned force" : "measured force";
     const who = [`Solid: ${isPlan ? "the plan" : "what was measured"}.`];
-    if (data.ghost) who.push("Blue: the plan, which was checked.");
+    if (data.ghost) who.push(data.proposed ? "Blue: the nearest that the robot can do." : "Blue: the plan, which was checked.");
+    document.querySelector("[data-ghost=ghost]").firstChild.textContent = data.proposed ? "Nearest" : "Plan";
     if (data.written) who.push("Brown: what was written; the plan is the nearest that the robot can do.");
     document.getElementById("who").textContent = who.join(" ");
   }

@@ -84,12 +84,15 @@ class ReplayData extends Run {
     this.ground = pack.header.ground ? { ...pack.header.ground, heights: pack.array("ground") } : null;
     this.sound = this.header.has_sound ? pack.array("sound") : null; // an MP3 file
     this.annotations = this.header.verdict ? this.header.verdict.annotations : [];
-    this.curves = (this.header.verdict ? this.header.verdict.curves : []).map((curve, k) => ({
+    const curvesOf = (verdict, prefix) => (verdict ? verdict.curves : []).map((curve, k) => ({
       ...curve,
-      time: pack.array(`curve${k}.time`),
-      margin: pack.array(`curve${k}.margin`),
-      worst: pack.array(`curve${k}.worst`),
+      time: pack.array(`${prefix}curve${k}.time`),
+      margin: pack.array(`${prefix}curve${k}.margin`),
+      worst: pack.array(`${prefix}curve${k}.worst`),
     }));
+    this.curves = curvesOf(this.header.verdict, "");
+    const { proposal } = this.header; // of the ghost, where that is another motion
+    this.proposed = proposal ? new Map(curvesOf(proposal, "proposal.").map((curve) => [curve.name, curve])) : null;
   }
 
   clampTime(t) {

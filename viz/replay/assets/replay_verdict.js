@@ -138,7 +138,8 @@ class MarginCurve extends TimeCanvas {
 
   draws(data, curve) {
     this.curve = curve;
-    const finite = Array.from(curve.margin).filter(Number.isFinite);
+    this.other = data.proposed?.get(curve.name);
+    const finite = [curve, this.other].flatMap((one) => Array.from(one?.margin ?? [])).filter(Number.isFinite);
     const high = Math.max(...finite, 1e-9), low = Math.min(...finite, 0);
     const span = high - low;
     this.high = high + 0.08 * span;
@@ -160,7 +161,12 @@ class MarginCurve extends TimeCanvas {
     if (this.isLarge) drawGrid(paint, this);
     const color = { broken: BAD, tight: TIGHT_INK, fine: ACCENT }[rank(this.curve)];
     this.fillBroken(paint, zero);
-    this.stroke(paint, color);
+    if (this.other) {
+      paint.setLineDash([5, 3]);
+      this.stroke(paint, GHOST, this.other);
+      paint.setLineDash([]);
+    }
+    this.stroke(paint, color, this.curve);
     paint.strokeStyle = BAD;
     paint.lineWidth = 1;
     paint.setLineDash([4, 3]);
@@ -184,8 +190,7 @@ class MarginCurve extends TimeCanvas {
   }
 
   // A line; a dot where a value stands alone.
-  stroke(paint, color) {
-    const { time, margin } = this.curve;
+  stroke(paint, color, { time, margin }) {
     paint.strokeStyle = paint.fillStyle = color;
     paint.lineWidth = this.isLarge ? 1.6 : 1.2;
     paint.lineJoin = "round";

@@ -37,6 +37,7 @@ class Doing {
     this.line.hidden = false;
     this.text.textContent = {
       loading: "loading the robot, once…",
+      nearing: `looking for the nearest motion, ${done.toFixed(1)} s of at most ${whole.toFixed(0)} s`,
       solving: `${this.asked || "Jump"}: looking for a way to do it, ${done.toFixed(1)} s of at most ${whole.toFixed(0)} s`,
       playing: whole ? `playing in MuJoCo, ${done.toFixed(1)} of ${whole.toFixed(1)} s` : "the robot gets ready in MuJoCo…",
     }[what];

@@ -27,11 +27,12 @@ class Studio {
     this.tools = new Tools(this);
     this.inspector = new Inspector(this);
     this.proposals = new Proposals(this);
+    this.nearest = new Nearest(this);
     this.hands = new Hands(this);
     this.onion = new Onion(this);
     this.library = new Library(this);
     document.getElementById("timeline").before(this.tools.box, this.music.box, this.tracks.box, this.view.box);
-    document.getElementById("sliders").before(this.inspector.box);
+    document.getElementById("sliders").before(this.nearest.box, this.inspector.box);
     this.charts = player.charts.filter(({ canvas }) => canvas.closest("footer"));
     for (const chart of this.charts) {
       chart.view = this.view;
@@ -47,11 +48,12 @@ class Studio {
 
   // Shows what is saved, or what the player has got; calls that were just changed or made are chosen.
   /**
-   * @param {Editor} editor
+   * @param {any} editor
    * @param {[number, number]} site
    */
   use(editor, site = null) {
-    if (!editor?.bars) return; // the player's data, as a chart of it: see `show`
+    if (editor instanceof ReplayData) return this.nearest.use(editor); // as a chart of it: see `show`
+    if (!editor?.bars) return;
     const isOther = this.editor && this.editor.motion !== editor.motion;
     this.editor = editor;
     const found = site ? editor.bars.findIndex((bar) => isAt(bar, site)) : -1;
@@ -382,13 +384,18 @@ class Studio {
     this.player.play(true);
   }
 
+  // Changes of all of it as buttons; then the nearest motion, which takes longer, beside one's own.
   async mend() {
+    if (this.player.data.header.verdict?.ok) return this.tell("the robot can do it");
+    const { base } = this.editor;
     const { changes } = await this.ask("mend", "looking for changes…");
-    if (!changes) return;
-    this.tell(changes.length ? "one click, and the robot can do it:" : "no change of tempo, size or height is enough", !changes.length);
+    if (!changes || this.editor.base !== base || this.isBusy) return null;
     this.tools.offer(changes.map(([call, meaning], which) => ({
       text: meaning, hint: `appends ${call}`, act: () => this.send({ op: "change", which }, true),
     })));
+    const found = changes.length ? "one click, and the robot can do it" : "no change of tempo, size or height is enough";
+    this.tell(`${found}; looking for the nearest motion, too…`);
+    return this.nearest.look();
   }
 
   async export(kind) {
@@ -443,6 +450,7 @@ class Studio {
     const isCommand = event.ctrlKey || event.metaKey;
     if (document.querySelector("dialog[open]")) return;
     if (event.key === "Escape" && this.doing.isOn) return void this.doing.cancel();
+    if (event.key === "Escape" && this.nearest.isOn) return void this.nearest.leave();
     if (event.key === "Escape" && this.selected !== null) return void this.giveUp();
     if (isTyping || (!isCommand && event.altKey)) return;
     const bare = {
@@ -451,6 +459,7 @@ class Studio {
       t: () => this.music.tap(), i: () => this.tools.focus("Insert a move"), "?": () => this.tools.help(),
       e: () => this.inspector.focus(), l: () => this.focusBars(), k: () => this.split(),
       h: () => this.onion.toggle(), a: () => this.library.open(), w: () => this.world.open(),
+      r: () => this.mend(), ...(this.nearest.isOn ? { y: () => this.nearest.take() } : {}),
       ",": () => this.nudge(-1), ".": () => this.nudge(1),
     };
     const commanded = {

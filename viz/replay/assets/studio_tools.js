@@ -10,6 +10,7 @@ const KEYS = [
   ["I", "insert a move"], ["A", "play a motion of the library"], ["E", "to the numbers of the bar"], ["Esc", "as it is saved, nothing chosen"],
   ["+ −", "zoom the time; also wheel or two fingers"], ["0", "all of the time"], ["Z", "zoom to what is chosen"],
   ["H", "onion skins: the robot before and after"],
+  ["R", "make it possible: changes, and the nearest motion beside yours"], ["Y, Esc", "take, leave what is proposed"],
   ["B", "play in physics"], ["W", "the world that it is checked and played in"], ["T", "tap the tempo"], ["1 2 3 4", "view from the corner, side, front, above"],
   ["N", "to the next limit that is broken or tight"],
 ];
@@ -53,7 +54,7 @@ class Tools {
       studio.music.buttons);
     this.robot = this.group("Robot",
       this.button("ask", "play", "Play in physics", "MuJoCo plays it beside the plan (B)"),
-      this.button("ask", "mend", "Make it possible", "Looks for changes after which the robot can do it"),
+      this.button("ask", "mend", "Make it possible", "Looks for changes after which the robot can do it, and for the nearest motion that it can (R)"),
       this.list("Export", "Export…", "Writes a file beside the motion's", Object.entries(exports), (kind) => studio.export(kind)),
       this.icon("help", "?", "Keys, and the tour (?)"));
   }

@@ -1,0 +1,172 @@
+"""The nearest motion that the robot can do, as a proposal: found, told, taken; or why none is."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NoReturn
+
+import pytest
+
+from controller.studio.nearness import asking, distance
+from controller.studio.orders import Order, Task
+from controller.studio.session import Studio
+from controller.studio.source import Source
+from controller.studio.working import STOPPED
+from go2_wbc.errors import StudioError
+from motions.feasibility.goal_errors import Departure
+from motions.registry import load_text
+from tests.viz.page_reader import read_message, read_pack
+
+HEAD = '''"""Sways."""
+
+from motions import Posture, Timeline, motion
+
+
+@motion
+def sway() -> Timeline:
+    """Sway, too fast."""
+'''
+SWAY = f"""{HEAD}    line = Timeline().hold(0.2).body(y=0.06, over=0.2).body(y=-0.06, over=0.2)
+    return line.home(over=0.3).hold(0.3)
+"""
+ASKED = SWAY.replace("Timeline().", 'Timeline(physics="nearest").')
+AWAY = f"{HEAD}    return Timeline().body(y=0.05, over=0.25).body(y=-0.05, over=0.3)\n"
+LONG = 60.0  #: s, of which a thread needs a few milliseconds
+HELPED = '''
+
+def begun() -> Timeline:
+    return Timeline()
+
+
+@motion
+def other() -> Timeline:
+    """Another one."""
+    return begun().hold(1.0)
+'''
+
+
+def _asking(text: str) -> str:
+    source = Source(text.encode())
+
+    def does_ask(after: Source) -> bool:
+        return load_text(Path("sway.py"), after.data)["sway"]().physics == "nearest"
+
+    return asking(source, "sway", does_ask).data.decode()
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("Timeline().", 'Timeline(physics="nearest").'),
+        ("Timeline(Posture.SIT).", 'Timeline(Posture.SIT, physics="nearest").'),
+        ("Timeline((Posture.STAND), ).", 'Timeline((Posture.STAND), physics="nearest", ).'),
+        ('Timeline(physics="as_written").', 'Timeline(physics="nearest").'),
+    ],
+)
+def test_a_motion_asks_for_it_where_it_begins(before: str, after: str) -> None:
+    text = SWAY.replace("Timeline().", before)
+    assert _asking(text) == SWAY.replace("Timeline().", after)
+
+
+def test_what_begins_elsewhere_is_asked_for_in_a_copy_that_is_returned() -> None:
+    text = SWAY.replace("= Timeline()", "= begun()") + HELPED
+    after = _asking(text)
+    assert "from dataclasses import replace\n" in after
+    assert 'return replace(line.home(over=0.3).hold(0.3), physics="nearest")' in after
+    assert load_text(Path("sway.py"), after.encode())["other"]().physics == "as_written"
+
+
+def test_where_no_edit_says_it_the_author_is_told_what_would() -> None:
+    with pytest.raises(
+        StudioError, match=r'Timeline\(physics="nearest"\) by hand where sway begins'
+    ):
+        asking(Source(SWAY.encode()), "sway", lambda _: False)
+
+
+def test_the_distance_is_that_of_the_farthest_part() -> None:
+    near = Departure(0.0, 1.0, 0.010, "trunk", 0.5, 0.1, 0.4, -0.02)
+    far = Departure(2.0, 3.0, 0.025, "FL_foot", 2.5, 0.05, 2.4, 0.01)
+    assert distance([near, far]) == (
+        "at most 25 mm (FL_foot at 2.50 s) and 5.7° (trunk at 0.40 s) from yours, and "
+        "0.020 s early; it differs from 0.00 to 1.00 s and from 2.00 to 3.00 s"
+    )
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("studio") / "sway.py"
+    path.write_text(SWAY, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def studio(file: Path) -> Iterator[Studio]:
+    with Studio(file, None, 0) as opened:
+        yield opened
+
+
+def _header(data: bytes) -> dict[str, Any]:
+    return read_pack(read_message(data, b"")[1])[0]
+
+
+@pytest.mark.slow
+def test_it_is_shown_beside_and_written_when_it_is_taken(studio: Studio, file: Path) -> None:
+    answer = studio.nearest({})
+    assert isinstance(answer, bytes)
+    told, data = read_message(answer, b"")
+    header, arrays = read_pack(data)
+    assert str(told["told"]).startswith("at most ")
+    assert [row for row in told["diff"] if row[0] in "+-"] == [
+        f"{sign}{text.splitlines()[8]}" for sign, text in (("-", SWAY), ("+", ASKED))
+    ]
+    assert not header["verdict"]["ok"]
+    assert header["proposal"]["ok"]
+    assert len(header["editor"]["bars"]) == 5
+    assert abs(arrays["q"] - arrays["ghost.q"]).max() > 0
+    assert file.read_text(encoding="utf-8") == SWAY, "nothing is written silently"
+    take = {"op": "nearest", "base": header["editor"]["base"], "commit": True}
+    assert isinstance(studio.edit(take), dict)
+    assert file.read_text(encoding="utf-8") == ASKED
+    taken = _header(studio._server.changes(""))
+    assert taken["verdict"]["text"] == header["proposal"]["text"]
+    late = {**take, "base": taken["editor"]["base"]}
+    assert "look for it again" in str(studio.edit(late)["error"])  # pyright: ignore[reportCallIssue, reportArgumentType]
+    assert studio.edit({"op": "undo"}) == {}
+    assert file.read_text(encoding="utf-8") == SWAY
+
+
+def test_an_edit_ends_the_search(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, stopped, answers = threading.Event(), threading.Event(), list[object]()
+
+    def run(order: Order) -> NoReturn:
+        begun.set()
+        assert order.task is Task.NEAREST
+        assert stopped.wait(LONG)
+        raise StudioError(STOPPED)
+
+    monkeypatch.setattr(studio._player, "run", run)
+    monkeypatch.setattr(studio._player, "stop", stopped.set)
+    search = threading.Thread(target=lambda: answers.append(studio.nearest({})))
+    search.start()
+    assert begun.wait(LONG)
+    editor = _header(studio._server.changes(""))["editor"]
+    order = {"op": "set", "site": editor["bars"][0]["site"], "name": "seconds", "value": 0.25}
+    assert isinstance(studio.edit({**order, "base": editor["base"]}), bytes)
+    search.join(LONG)
+    assert answers == [{"error": STOPPED}]
+
+
+@pytest.mark.slow
+def test_the_nearest_of_a_motion_without_an_end_breaks_a_limit_and_is_not_proposed(
+    studio: Studio, file: Path
+) -> None:
+    file.write_text(AWAY, encoding="utf-8")
+    assert studio.look() or studio.look()
+    told = "the nearest motion that was found still breaks a limit: entry and exit, exit place"
+    answer = studio.nearest({})
+    assert isinstance(answer, dict)
+    assert str(answer["error"]).startswith(told)
+    file.write_text(SWAY, encoding="utf-8")
+    assert studio.look() or studio.look()

@@ -1,0 +1,82 @@
+"""The nearest motion is put beside one's own on the page, and taken or left by a key."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.controller.studio.test_nearness import ASKED, SWAY
+from tests.viz.replay.browsing import Tab
+from tests.viz.replay.studio_tab import SETTLED, undo_all
+
+pytestmark = pytest.mark.slow
+BOX = "document.getElementById('nearest')"
+SEEN = """(() => {
+  const { canvas } = replay.verdict.large;
+  const dots = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+  let count = 0;
+  for (let i = 0; i < dots.length; i += 4) {
+    count += Math.hypot(dots[i] - 0x7c, dots[i + 1] - 0x93, dots[i + 2] - 0xd6) < 30;
+  }
+  return count;
+})()"""
+"""How many dots of the large curve are of the ghost's colour."""
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("studio") / "sway.py"
+    path.write_text(SWAY, encoding="utf-8")
+    return path
+
+
+def _propose(tab: Tab) -> None:
+    tab.evaluate("document.activeElement.blur()")
+    tab.page.keyboard.press("r")
+    tab.wait_for(f"!{BOX}.hidden")
+
+
+def test_it_is_seen_beside_ones_own_and_left(tab: Tab, file: Path) -> None:
+    tab.evaluate("replay.scrub(0.42), replay.openTab('check')")
+    before, curve = tab.stage(), tab.evaluate(SEEN)
+    _propose(tab)
+    told = tab.text("#nearest p")
+    assert told.startswith("It is at most ")
+    assert " mm (trunk at " in told
+    assert tab.text("#nearest p + p").startswith("Yours: 5 limits broken. This one: feasible")
+    rows = tab.page.locator("#nearest .added, #nearest .removed").all_inner_texts()
+    assert [row.strip() for row in rows] == [
+        f"{sign}{text.splitlines()[8]}" for sign, text in (("-", SWAY), ("+", ASKED))
+    ]
+    assert tab.text("#who") == "Solid: the plan. Blue: the nearest that the robot can do."
+    assert tab.text("[data-ghost=ghost]") == "Nearest: beside"
+    assert tab.text("#badge") == "5 limits broken", "that is one's own"
+    assert np.abs(tab.stage() - before).max() > 50.0, "a ghost in the 3D view"
+    assert curve == 0
+    assert tab.evaluate(SEEN) > 20, "a curve beside the margin"
+    assert tab.page.locator("#studio-changes button").count() > 0, "changes of all of it, too"
+    assert tab.evaluate("document.activeElement.textContent") == "Take it (Y)"
+    tab.page.keyboard.press("Escape")
+    tab.wait_for(f"{BOX}.hidden && replay.data.ghost === null")
+    assert file.read_text(encoding="utf-8") == SWAY
+
+
+def test_it_is_taken_by_a_key_and_undone(tab: Tab, file: Path) -> None:
+    _propose(tab)
+    tab.page.keyboard.press("y")
+    tab.wait_for(f"{BOX}.hidden && {SETTLED} && studio.editor.undo")
+    assert file.read_text(encoding="utf-8") == ASKED
+    assert tab.text("#badge").startswith("feasible")
+    assert tab.evaluate("replay.data.written !== null"), "what was written stays in sight"
+    undo_all(tab, file, SWAY)
+    assert tab.text("#badge") == "5 limits broken"
+
+
+def test_an_edit_ends_a_proposal(tab: Tab, file: Path) -> None:
+    _propose(tab)
+    tab.evaluate("studio.set(studio.editor.bars[0], 'seconds', 0.4, true)")
+    tab.wait_for(f"{SETTLED} && studio.editor.undo")
+    assert tab.evaluate(f"{BOX}.hidden && replay.data.ghost === null")
+    assert "hold(0.4)" in file.read_text(encoding="utf-8")
