@@ -1,15 +1,23 @@
-"""Bars as the page needs them."""
+"""Bars, and what is done with them, as the page needs them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 
-from controller.studio.orders import Bar
+from controller.studio import worlds
+from controller.studio.certifying import RUNS
+from controller.studio.edits import PALETTE
+from controller.studio.exports import EXPORTS
+from controller.studio.grounds import Ground
+from controller.studio.orders import Answer, Bar
+from controller.studio.project import Project
+from controller.studio.songs import songs_beside
 from controller.studio.source import Slot, parameters
 from go2_wbc.curves import Ease
 from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import Posture
+from go2_wbc.world import World
 from motions.language.body_and_feet import POSES
 from motions.language.steps import STEP_GAITS
 
@@ -27,6 +35,29 @@ WORDS: Mapping[str, Sequence[str]] = {
 _BAR = tuple(field.name for field in fields(Bar))
 _SLOT = tuple(field.name for field in fields(Slot) if field.name != "is_choice")
 _DRAFT = ("name", "number", "span", "parts", "broken", "values")  #: What a drag changes of a bar
+
+
+def editor(
+    shown: Answer, project: Project, world: World, ground: Ground | None
+) -> dict[str, object]:
+    """What the page shows of a file that is saved, and what may be asked for."""
+    return {
+        "bars": [saved(bar) for bar in shown.bars],
+        "file": project.path.name,
+        "motion": shown.title,
+        "motions": shown.motions,
+        "base": project.base,
+        "undo": project.can_undo,
+        "redo": project.can_redo,
+        "palette": list(PALETTE),
+        "songs": songs_beside(project.path),
+        "exports": EXPORTS,
+        "runs": RUNS,
+        "notes": shown.notes,
+        "world": worlds.shown(world, ground),
+        "words": WORDS,
+        "lanes": ["trunk", *(leg.name for leg in LEGS), "robot", "time"],
+    }
 
 
 def saved(bar: Bar) -> dict[str, object]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from shlex import quote
@@ -10,6 +10,7 @@ from typing import Final
 
 import viz
 from controller.studio.songs import songs_beside, sound_of
+from go2_wbc.errors import Go2WbcError, unknown_name
 from go2_wbc.files import checked_output, write_atomically
 from viz.content import ReplayContent
 
@@ -52,6 +53,43 @@ def test_the_robot_can_do_{motion}(check_motion):
     """If not, this tells which limit is broken, when, and by how much."""
     check_motion(load_file(Path(__file__).with_name({file!r}))[{motion!r}])
 '''
+
+
+def exported(
+    file: Path,
+    motion: str,
+    order: Mapping[str, object],
+    content: Callable[[], ReplayContent],
+    write: Callable[[Path], object],
+) -> tuple[dict[str, object], Path | None]:
+    """Write a motion beside its file; what the page is told, and the file that was written.
+
+    A file that is there is written over only ``again``; "exists" asks for that. A test that is
+    there is kept.
+
+    Args:
+        file: of the motion.
+        motion: its name.
+        order: ``kind`` is one of ``EXPORTS``; a page has the ``song`` that is named.
+        content: what a page or film shows.
+        write: writes anything else.
+    """
+    kind = order.get("kind")
+    if not isinstance(kind, str) or kind not in EXPORTS:
+        return {"error": unknown_name("kind", str(kind), EXPORTS)}, None
+    path, is_new = beside(file, motion, kind), True
+    if kind != "test" and path.exists() and order.get("again") is not True:
+        return {"exists": path.name}, None
+    try:
+        if kind == "test":
+            is_new = write_test(path, file, motion)
+        elif kind in PICTURES:
+            write_pictures(content(), path, file, motion, order.get("song"))
+        else:
+            write(path)
+    except Go2WbcError as error:
+        return {"error": str(error)}, None
+    return answer(path, kind, is_new=is_new), path
 
 
 def beside(file: Path, motion: str, kind: str) -> Path:

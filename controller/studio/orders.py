@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 LONGEST_RUN = 2.0
 """Processor time [s] that a file may take to make its motion: own choice, the library's take 10 ms,
 one of 1,000 calls 0.3 s."""
+STOPPED = "stopped: the motion is as it was"
 AT_ONCE = 1e-6  #: Time [s] to solve a jump for, in which only what is known is found
 
 
@@ -74,9 +75,11 @@ class Order:
 class Doing:
     """How far the process has got, told while it works."""
 
-    what: str  #: "loading", "solving", "nearing" (the nearest motion) or "playing"
-    done: float = 0.0  #: time [s] that was solved for, or of the motion that was played
-    whole: float = 0.0  #: of so many seconds
+    what: str  #: "loading", "solving", "nearing" (the nearest motion), "playing" or "certifying"
+    done: float = 0.0  #: time [s] that was solved for, or of the motion that was played; or runs
+    whole: float = 0.0  #: of so many seconds, or runs
+    rate: tuple[int, float, float] | None = None
+    """Of the runs, those in which the motion was done, and the interval of the rate, 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 from typing import final
 
@@ -28,6 +29,11 @@ class Project:
         self._glimpse = self.saved
         self._before: list[bytes] = []
         self._after: list[bytes] = []
+
+    @property
+    def base(self) -> str:
+        """A name for what the file says, which no other text has."""
+        return hashlib.sha256(self.saved).hexdigest()
 
     @property
     def can_undo(self) -> bool:

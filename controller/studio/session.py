@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import secrets
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import final
 
-from controller.studio import bars, exports, songs, worlds
-from controller.studio.edits import PALETTE, cut_of, edited, run_of, site_of
+from controller.studio import bars, certifying, exports, songs, worlds
+from controller.studio.edits import cut_of, edited, run_of, site_of
 from controller.studio.grounds import Ground, ground_of
 from controller.studio.library import library
 from controller.studio.orders import AT_ONCE, Answer, Bar, Cut, Doing, Order, Task
@@ -27,11 +27,10 @@ from controller.studio.shows import with_show
 from controller.studio.source import Source
 from controller.studio.together import copied, edited_together, pasted
 from go2_wbc.errors import Go2WbcError, StudioError, unknown_name
-from go2_wbc.legs import LEGS
 from go2_wbc.world import World
 from motions.authoring import Value
 from viz.content import ReplayContent
-from viz.replay.page_data import Prepared
+from viz.replay.page_data import Prepared, prepared
 from viz.replay.preview_server import PreviewServer
 
 _log = logging.getLogger(__name__)
@@ -74,7 +73,7 @@ class Studio:
         self._changes: tuple[str, ...] = ()
         self._copied: tuple[str, ...] = ()
         self._proposed: tuple[bytes, bytes] | None = None  # what was saved, and the nearest to it
-        self._is_idle_work = False  # what the process that plays does ends with the next edit
+        self._ending, self._is_searching = threading.Event(), False  # what an edit ends
         self._motions: tuple[str, ...] = ()
         self._bars: tuple[Bar, ...] = ()
         try:
@@ -99,6 +98,7 @@ class Studio:
                     "/highest": self.highest,
                     "/mend": self.mend,
                     "/nearest": self.nearest,
+                    "/certify": self.certify,
                     "/export": self.export,
                 },
             )
@@ -154,7 +154,7 @@ class Studio:
             try:
                 if self._project.refresh():
                     self.show()
-                if order.get("op") not in HISTORY and order.get("base") != self._base:
+                if order.get("op") not in HISTORY and order.get("base") != self._project.base:
                     raise StudioError("the file was saved elsewhere: this is what it says now")
                 if order.get("op") == "saved":
                     return {}
@@ -172,7 +172,8 @@ class Studio:
                 return {"error": str(error)}
 
     def _done(self, order: Mapping[str, object]) -> dict[str, object] | bytes:
-        if self._is_idle_work:
+        if self._is_searching:
+            self._ending.set()
             self._player.stop()
         if (op := order.get("op")) in HISTORY:
             (self._project.undo if op == "undo" else self._project.redo)()
@@ -282,6 +283,7 @@ class Studio:
 
     def cancel(self, _: Mapping[str, object]) -> dict[str, object]:
         """End what is solved or played; its request then is answered with an error."""
+        self._ending.set()
         self._runner.stop()
         self._player.stop()
         return {}
@@ -319,46 +321,66 @@ class Studio:
         With how far it is, and the "diff" of ``op`` "nearest". The next edit ends the search.
         """
         data = self._project.saved
-        self._is_idle_work = True
         try:
-            shown = self._run(data, Task.NEAREST, longest=LONGEST_NEAREST)
+            with self._search_ended_by_edits():
+                shown = self._run(data, Task.NEAREST, longest=LONGEST_NEAREST)
             if shown.text is None:
                 raise StudioError(f"no motion near to yours in {LONGEST_NEAREST:g} s of work")
         except StudioError as error:
             return {"error": str(error)}
-        finally:
-            self._is_idle_work = False
         self._proposed = data, shown.text[0]
         told = proposal(Source(data), Source(shown.text[0]), self.motion or "")
         told["told"] = shown.told
         return self._server.answer(told, self._content(shown), shown.title, order.get("has"))
 
-    def export(self, order: Mapping[str, object]) -> dict[str, object]:
-        """Write what is saved beside the file: ``kind`` is one of ``EXPORTS``.
+    def certify(self, order: Mapping[str, object]) -> dict[str, object]:
+        """How often what is saved is done in ``runs`` random worlds around the one that is chosen.
 
-        A page has the ``song`` that is named. A file that is there is written over only ``again``;
-        "exists" asks for that. A test that is there is kept.
+        That is shown beside the verdict; told is a "row" of a table. The next edit ends it.
         """
-        kind, file, motion = order.get("kind"), self._project.path, self.motion or ""
-        if not isinstance(kind, str) or kind not in exports.EXPORTS:
-            return {"error": unknown_name("kind", str(kind), exports.EXPORTS)}
-        path, is_new = exports.beside(file, motion, kind), True
-        if kind != "test" and path.exists() and order.get("again") is not True:
-            return {"exists": path.name}
+        data, base, motion = self._project.saved, self._project.base, self.motion or ""
+        tell = partial(self._told_of, "certify")
         try:
-            if kind == "test":
-                is_new = exports.write_test(path, file, motion)
-            elif kind in exports.PICTURES:
-                shown = self._run(self._project.saved, Task.EXPORT)
-                content = replace(_whole(self._content(shown)), editor=None)
-                exports.write_pictures(content, path, file, shown.title, order.get("song"))
-            else:
-                out = self._order(self._project.saved, Task.WRITE, 0.0)
-                self._player.run(replace(out, out=path))
+            with self._search_ended_by_edits():
+                around = self._writer(), order, self._world
+                rate = certifying.certified(*around, tell, self._ending)
         except Go2WbcError as error:
             return {"error": str(error)}
-        self._server.files[path.name] = path
-        return exports.answer(path, kind, is_new=is_new)
+        finally:
+            tell(None)
+        with self._lock:
+            if (base, motion) == (self._project.base, self.motion):
+                shown = self._run(data)
+                content = certifying.with_rate(prepared(self._content(shown)), rate)
+                self._server.publish(content, shown.title)
+        return {"row": certifying.row_of(rate, motion, base)}
+
+    @contextmanager
+    def _search_ended_by_edits(self) -> Iterator[None]:
+        self._ending.clear()
+        self._is_searching = True
+        try:
+            yield
+        finally:
+            self._is_searching = False
+
+    def export(self, order: Mapping[str, object]) -> dict[str, object]:
+        """Write what is saved beside the file: see ``exports.exported``."""
+
+        def content() -> ReplayContent:
+            shown = self._run(self._project.saved, Task.EXPORT)
+            return replace(_whole(self._content(shown)), editor=None)
+
+        file, motion = self._project.path, self.motion or ""
+        told, path = exports.exported(file, motion, order, content, self._writer())
+        if path is not None:
+            self._server.files[path.name] = path
+        return told
+
+    def _writer(self) -> Callable[[Path], object]:
+        """Writes what is saved now into a file, as its ending says."""
+        order = self._order(self._project.saved, Task.WRITE, 0.0)
+        return lambda out: self._player.run(replace(order, out=out))
 
     def look(self) -> bool:
         """Show what somebody else has saved, once it rests; whether anything is new."""
@@ -398,10 +420,6 @@ class Studio:
     def _end(self) -> None:
         self._runner.close()
         self._player.close()
-
-    @property
-    def _base(self) -> str:
-        return hashlib.sha256(self._project.saved).hexdigest()
 
     def _choose(self, values: dict[str, Value]) -> None:
         with self._lock:
@@ -457,22 +475,7 @@ class Studio:
         return order
 
     def _content(self, shown: Answer) -> ReplayContent | Prepared:
-        editor = {
-            "bars": [bars.saved(bar) for bar in shown.bars],
-            "file": self._project.path.name,
-            "motion": shown.title,
-            "motions": shown.motions,
-            "base": self._base,
-            "undo": self._project.can_undo,
-            "redo": self._project.can_redo,
-            "palette": list(PALETTE),
-            "songs": songs.songs_beside(self._project.path),
-            "exports": exports.EXPORTS,
-            "notes": shown.notes,
-            "world": worlds.shown(self._world, self._ground),
-            "words": bars.WORDS,
-            "lanes": ["trunk", *(leg.name for leg in LEGS), "robot", "time"],
-        }
+        editor = bars.editor(shown, self._project, self._world, self._ground)
         self._motions = shown.motions
         return replace(_shown(shown), editor=editor)
 

@@ -20,6 +20,7 @@ from controller.studio.grounds import Ground
 from controller.studio.literals import Run
 from controller.studio.orders import (
     AT_ONCE,
+    STOPPED,
     Answer,
     Bar,
     Cut,
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
     from viz.content import ReplayContent
 
 
-STOPPED = "stopped: the motion is as it was"
 RARELY = 100_000  #: New objects after which what is unused is looked for; an edit makes 3,000
 PERIOD = 0.1  #: s, between two words of how far it is
 

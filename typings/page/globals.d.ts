@@ -58,6 +58,8 @@ interface Editor {
   palette: string[];
   songs: string[];
   exports: Record<string, string>;
+  /** How many runs may be asked for. */
+  runs: number[];
   notes: string[];
   words: Record<string, string[]>;
   lanes: string[];

@@ -10,10 +10,9 @@ from typing import Any, NoReturn
 import pytest
 
 from controller.studio.nearness import asking, distance
-from controller.studio.orders import Order, Task
+from controller.studio.orders import STOPPED, Order, Task
 from controller.studio.session import Studio
 from controller.studio.source import Source
-from controller.studio.working import STOPPED
 from go2_wbc.errors import StudioError
 from motions.feasibility.goal_errors import Departure
 from motions.registry import load_text

@@ -75,7 +75,7 @@ def test_the_studio_shows_it_judges_it_and_takes_it_back(tmp_path: Path) -> None
     file = tmp_path / "acts.py"
     file.write_text(ACTS, encoding="utf-8")
     with Studio(file, None, 0) as studio:
-        show = {"op": "show", "base": studio._base, "commit": True}
+        show = {"op": "show", "base": studio._project.base, "commit": True}
         assert set(studio.edit(show)) == {"site"}
         assert (studio.motion, studio._motions) == ("show", ("bow", "wave", "show"))
         assert len(studio._bars) == 6, "its five moves, and that one follows the other"
@@ -86,7 +86,7 @@ def test_the_studio_shows_it_judges_it_and_takes_it_back(tmp_path: Path) -> None
         file.write_text(ACTS.replace(".home(over=0.6)", ""), encoding="utf-8")
         assert studio.look() or studio.look()
         refused = file.read_bytes()
-        told = str(studio.edit({**show, "base": studio._base}))
+        told = str(studio.edit({**show, "base": studio._project.base}))
         assert "then()" in told, "the first does not come home"
         assert file.read_bytes() == refused
         assert studio.motion == "bow"

@@ -14,9 +14,10 @@ class Doing {
     this.text = element("span");
     this.bar = element("progress");
     this.bar.setAttribute("aria-label", "How far it is");
+    this.rate = element("span", { className: "rate" });
     const button = element("button", { textContent: "Cancel", title: "Ends it; the motion stays as it was (Esc)" });
     button.addEventListener("click", () => this.cancel());
-    this.line.append(this.text, this.bar, button);
+    this.line.append(this.text, this.rate, this.bar, button);
     this.why = element("p", { id: "studio-why", hidden: true });
   }
 
@@ -24,21 +25,24 @@ class Doing {
     return !this.line.hidden;
   }
 
-  // What the server tells of the process that edits, and of the one that plays.
-  /** @param {Record<string, { what: string, done: number, whole: number }>} doing */
-  use({ edit, play }) {
-    const told = edit ?? play;
+  // What the server tells of the process that edits, of the one that plays, and of those that count.
+  /** @param {Record<string, { what: string, done: number, whole: number, rate: [number, number, number] | null }>} doing */
+  use({ edit, play, certify }) {
+    const told = edit ?? play ?? certify;
     clearTimeout(this.leaving);
     if (!told) {
       this.leaving = setTimeout(() => { this.line.hidden = true; }, LINGERS);
       return;
     }
-    const { what, done, whole } = told;
+    const { what, done, whole, rate } = told;
+    const [good, low, high] = rate ?? [0, 0, 1];
+    this.rate.replaceChildren(...(rate ? [rateBar([[low, high, "interval"], [good / done, good / done, "rate"]])] : []));
     this.line.hidden = false;
     this.text.textContent = {
       loading: "loading the robot, once…",
       nearing: `looking for the nearest motion, ${done.toFixed(1)} s of at most ${whole.toFixed(0)} s`,
       solving: `${this.asked || "Jump"}: looking for a way to do it, ${done.toFixed(1)} s of at most ${whole.toFixed(0)} s`,
+      certifying: rate ? `done in ${good} of ${done} runs, of ${whole}; 95 % interval ${percent(low)} to ${percent(high)}` : `${whole} runs in random worlds: robots get ready…`,
       playing: whole ? `playing in MuJoCo, ${done.toFixed(1)} of ${whole.toFixed(1)} s` : "the robot gets ready in MuJoCo…",
     }[what];
     if (whole) this.bar.value = Math.min(done / whole, 1);

@@ -28,12 +28,14 @@ class Studio {
     this.inspector = new Inspector(this);
     this.proposals = new Proposals(this);
     this.nearest = new Nearest(this);
+    this.certify = new Certify(this);
     this.hands = new Hands(this);
     this.onion = new Onion(this);
     this.library = new Library(this);
     document.getElementById("timeline").before(this.tools.box, this.music.box, this.tracks.box, this.view.box);
     document.getElementById("sliders").before(this.nearest.box, this.inspector.box);
     this.charts = player.charts.filter(({ canvas }) => canvas.closest("footer"));
+    document.getElementById("trust").after(this.certify.box);
     for (const chart of this.charts) {
       chart.view = this.view;
       chart.left = LANE_LEFT;
@@ -85,6 +87,7 @@ class Studio {
     this.tracks.use(this.player.data, editor);
     this.music.use(editor);
     this.world.use(editor);
+    this.certify.use(editor);
     this.inspector.use(this.bar(), editor, this.timeUnit, this.chosen.size);
     this.hands.use();
   }
@@ -459,7 +462,7 @@ class Studio {
       t: () => this.music.tap(), i: () => this.tools.focus("Insert a move"), "?": () => this.tools.help(),
       e: () => this.inspector.focus(), l: () => this.focusBars(), k: () => this.split(),
       h: () => this.onion.toggle(), a: () => this.library.open(), w: () => this.world.open(),
-      r: () => this.mend(), ...(this.nearest.isOn ? { y: () => this.nearest.take() } : {}),
+      v: () => this.tools.focus("Certify"), r: () => this.mend(), ...(this.nearest.isOn ? { y: () => this.nearest.take() } : {}),
       ",": () => this.nudge(-1), ".": () => this.nudge(1),
     };
     const commanded = {

@@ -11,7 +11,7 @@ const KEYS = [
   ["+ −", "zoom the time; also wheel or two fingers"], ["0", "all of the time"], ["Z", "zoom to what is chosen"],
   ["H", "onion skins: the robot before and after"],
   ["R", "make it possible: changes, and the nearest motion beside yours"], ["Y, Esc", "take, leave what is proposed"],
-  ["B", "play in physics"], ["W", "the world that it is checked and played in"], ["T", "tap the tempo"], ["1 2 3 4", "view from the corner, side, front, above"],
+  ["B", "play in physics"], ["V", "certify: play it in random worlds, and count"], ["W", "the world that it is checked and played in"], ["T", "tap the tempo"], ["1 2 3 4", "view from the corner, side, front, above"],
   ["N", "to the next limit that is broken or tight"],
 ];
 
@@ -35,7 +35,7 @@ class Tools {
   }
 
   fill(studio) {
-    const { palette, exports } = studio.player.data.header.editor;
+    const { palette, exports, runs } = studio.player.data.header.editor;
     this.row.append(
       this.group("History", this.button("op", "undo", "Undo", "Ctrl+Z"), this.button("op", "redo", "Redo", "Ctrl+Y")),
       this.group("Moves",
@@ -55,6 +55,7 @@ class Tools {
     this.robot = this.group("Robot",
       this.button("ask", "play", "Play in physics", "MuJoCo plays it beside the plan (B)"),
       this.button("ask", "mend", "Make it possible", "Looks for changes after which the robot can do it, and for the nearest motion that it can (R)"),
+      this.list("Certify", "Certify…", "Plays it in MuJoCo in random worlds around the one that is chosen, and counts how often it is done (V)", runs.map((count) => [String(count), `${count} runs`]), (count) => studio.certify.play(count)),
       this.list("Export", "Export…", "Writes a file beside the motion's", Object.entries(exports), (kind) => studio.export(kind)),
       this.icon("help", "?", "Keys, and the tour (?)"));
   }

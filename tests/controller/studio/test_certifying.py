@@ -1,0 +1,89 @@
+"""How often a motion is done in random worlds, as the studio counts it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from controller.studio.certifying import around, runs_of
+from controller.studio.orders import STOPPED, Doing
+from controller.studio.session import Studio
+from controller.sweeps.summary import rate_interval
+from go2_wbc.errors import StudioError
+from go2_wbc.world import DOUBTFUL, World
+from tests.viz.page_reader import read_message, read_pack
+
+NOD = '''"""Nods."""
+
+from motions import Timeline, deg, motion
+
+
+@motion
+def nod() -> Timeline:
+    """Nod."""
+    return Timeline().body(pitch=deg(6.0), over=0.5).home(over=0.5)
+'''
+RUNS = 4
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Studio]:
+    path = tmp_path_factory.mktemp("studio") / "nod.py"
+    path.write_text(NOD, encoding="utf-8")
+    with Studio(path, None, 0) as opened:
+        yield opened
+
+
+@pytest.mark.parametrize("runs", [0, 7.5, True, "20", None, 1001])
+def test_only_so_many_runs_may_be_asked_for(runs: object) -> None:
+    with pytest.raises(StudioError, match="runs are a number from 1 to 1000"):
+        runs_of({"runs": runs})
+
+
+def test_worlds_are_drawn_around_the_one_that_is_chosen() -> None:
+    assert around(World()) == DOUBTFUL
+    own = around(World(friction=0.3, payload=2.0, sensors="imu"))
+    assert (own.friction, own.payload, own.sensors) == (0.3, 2.0, "imu")
+    assert own.friction_uncertainty == DOUBTFUL.friction_uncertainty
+
+
+@pytest.mark.slow
+def test_every_run_is_told_and_the_interval_narrows(
+    studio: Studio, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = list[Doing]()
+    monkeypatch.setattr(
+        studio, "_told_of", lambda which, one: told.append(one) if which == "certify" else None
+    )
+    assert studio.certify({"runs": 0})["error"]
+    row = studio.certify({"runs": RUNS})["row"]
+    assert isinstance(row, dict)
+    counted = [one for one in told if one is not None and one.rate is not None]
+    assert [one.done for one in counted] == list(range(1, RUNS + 1))
+    widths = [one.rate[2] - one.rate[1] for one in counted if one.rate is not None]
+    assert widths == sorted(widths, reverse=True)
+    assert widths[-1] < 0.8 * widths[0]
+    assert (row["n"], row["motion"], row["base"]) == (RUNS, "nod", studio._project.base)
+    assert row["interval"] == rate_interval(row["done"], RUNS)
+    header = read_pack(read_message(studio._server.changes(""), b"")[1])[0]
+    certified = header["verdict"]["certified"]
+    assert (certified["n"], certified["done"], certified["outdated"]) == (RUNS, row["done"], "")
+    assert len(certified["worst"]) == RUNS
+
+
+@pytest.mark.slow
+def test_the_next_edit_ends_it(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, answers = threading.Event(), list[object]()
+    monkeypatch.setattr(
+        studio, "_told_of", lambda which, one: begun.set() if which == "certify" else None
+    )
+    count = threading.Thread(target=lambda: answers.append(studio.certify({"runs": 200})))
+    count.start()
+    assert begun.wait(60.0)
+    editor = read_pack(read_message(studio._server.changes(""), b"")[1])[0]["editor"]
+    order = {"op": "set", "site": editor["bars"][0]["site"], "name": "over", "value": 0.6}
+    assert isinstance(studio.edit({**order, "base": editor["base"]}), bytes)
+    count.join()
+    assert answers == [{"error": STOPPED}]

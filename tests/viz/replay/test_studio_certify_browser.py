@@ -1,0 +1,73 @@
+"""A motion is certified on the page: run by run, with its interval; ended by a button; a table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.controller.studio.test_certifying import NOD
+from tests.viz.replay.browsing import Tab
+from tests.viz.replay.studio_tab import SETTLED, undo_all
+
+pytestmark = pytest.mark.slow
+DOING = "document.getElementById('studio-doing')"
+RUNS = 3
+ROWS = "#certified tbody tr"
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("studio") / "nod.py"
+    path.write_text(NOD, encoding="utf-8")
+    return path
+
+
+def _hear(tab: Tab, act: str) -> None:
+    """Do something whenever the line of what is being done changes."""
+    tab.evaluate(
+        f"window.hearing = new MutationObserver(() => {{ {act} }}),"
+        f" hearing.observe({DOING}, {{ childList: true, subtree: true, characterData: true }})"
+    )
+
+
+def test_the_interval_is_told_run_by_run_and_stays_as_a_row(tab: Tab, file: Path) -> None:
+    tab.evaluate("document.activeElement.blur()")
+    tab.page.keyboard.press("v")
+    assert tab.evaluate("document.activeElement.getAttribute('aria-label')") == "Certify"
+    options = tab.page.locator("[aria-label=Certify] option").all_inner_texts()
+    assert options == ["Certify…", "20 runs", "50 runs", "100 runs", "200 runs"]
+    assert not tab.is_shown("#certified")
+    _hear(tab, f"(window.told ??= []).push({DOING}.textContent, {DOING}.innerHTML)")
+    tab.evaluate(f"void studio.certify.play({RUNS})")
+    tab.wait_for(f"document.querySelector('{ROWS}')")
+    tab.evaluate("hearing.disconnect()")
+    told = tab.evaluate("told")
+    live = [text for text in told if text.startswith("done in ") and f"runs, of {RUNS};" in text]
+    assert any(text.startswith("done in 1 of 1 runs") for text in live)
+    assert any("95 % interval 2.5 % to 100 %" in text for text in live)
+    assert any("rate-bar" in html for html in told)
+    cells = tab.page.locator(f"{ROWS} td").all_inner_texts()
+    assert cells[0] == "Nod"
+    assert cells[1].startswith("friction 0.5 +-10 %")
+    assert cells[2:] == ["3 of 3", "29.2 % to 100 %"]
+    assert tab.text("#certificate summary b") == "Certificate: done in 3 of 3 runs"
+    assert file.read_text(encoding="utf-8") == NOD
+    tab.evaluate("studio.set(studio.editor.bars[0], 'over', 0.7, true)")
+    tab.wait_for(f"{SETTLED} && studio.editor.undo")
+    assert tab.evaluate(f"document.querySelector('{ROWS}').className") == "old"
+    assert not tab.is_shown("#certificate"), "that was of another text"
+    undo_all(tab, file, NOD)
+    assert tab.evaluate(f"document.querySelector('{ROWS}').className") == ""
+
+
+def test_it_is_cancelled(tab: Tab, file: Path) -> None:
+    count = tab.page.locator(ROWS).count()
+    cancel = f"{DOING}.querySelector('button').click()"
+    _hear(tab, f"if ({DOING}.textContent.includes(' of 200')) {cancel}")
+    tab.evaluate("void studio.certify.play(200)")
+    tab.wait_for("studio.tools.told === 'stopped: the motion is as it was'")
+    tab.evaluate("hearing.disconnect()")
+    tab.wait_for(f"{DOING}.hidden")
+    assert tab.page.locator(ROWS).count() == count
+    assert file.read_text(encoding="utf-8") == NOD
