@@ -115,6 +115,7 @@ class Verdict:
         curves: the margin of every limit.
         chance: that the movement is done, 0 to 1; None if nothing is said of it.
         world: in which all this holds, in words.
+        coarse: why it is only a first answer, in words; empty if it is exact.
         certified: how often it was done in randomised runs.
     """
 
@@ -124,6 +125,7 @@ class Verdict:
     curves: tuple[MarginCurve, ...]
     chance: float | None = None
     world: str = ""
+    coarse: str = ""
     certified: CertifiedRate | None = None
 
     __repr__ = brief

@@ -38,7 +38,7 @@ _DRAFT = ("name", "number", "span", "parts", "broken", "values")  #: What a drag
 
 
 def editor(
-    shown: Answer, project: Project, world: World, ground: Ground | None
+    shown: Answer, project: Project, world: World, ground: Ground
 ) -> dict[str, object]:
     """What the page shows of a file that is saved, and what may be asked for."""
     return {

@@ -1,4 +1,8 @@
-"""Motions of which some jumps have no plan: they are shown all the same, and rest meanwhile."""
+"""Motions of which some part has no plan yet: they are shown all the same.
+
+The robot rests in the place of a jump. Where the nearest motion is asked for, what is written
+stands for it: a coarse answer at once, and while something is dragged.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +10,14 @@ from collections.abc import Collection
 from dataclasses import replace
 from typing import final
 
-from controller.studio.orders import Order, TooLong
+from controller.studio.orders import Order, Task, TooLong
 from controller.studio.plain import LOOKED_FOR, NO_WAY, UNSOLVED
 from go2_wbc.curves import Ease
 from go2_wbc.world import World
 from motions import CheckedMotion, FeasibilityChecker, Timeline
 from motions.dynamics.phases import Phase, Progress
 from motions.language.keys import BodyKey, Key, PhaseKey
+from motions.language.timeline_data import AS_WRITTEN, NEAREST
 from motions.memory import Memory
 from motions.plan.compiled_plan import CompiledPlan, Problem
 
@@ -40,12 +45,25 @@ class Jumps:
                 model, world=felt, memory=Memory(), progress=self._progress
             )
 
-    def evaluate(self, line: Timeline, order: Order) -> CheckedMotion:
-        """What the check says of it; of an order that is to be shown, without what was not found.
+    def evaluate(self, line: Timeline, order: Order) -> tuple[CheckedMotion, bool]:
+        """What the check says of it, and whether coarsely: of what is written, not of the nearest.
+
+        Of an order that is to be shown, without what was not found.
 
         Raises:
-            TooLong: if a jump was not found in time, and the order is not to be shown without.
+            TooLong: if that was not found in time, and the order is not to be shown without.
         """
+        if line.physics != NEAREST:
+            return self._evaluated(line, order), False
+        if order.task is not Task.DRAFT:
+            try:
+                return self.checker.evaluate(line), False
+            except TooLong:
+                if not order.is_shown:
+                    raise
+        return self._evaluated(replace(line, physics=AS_WRITTEN), order), True
+
+    def _evaluated(self, line: Timeline, order: Order) -> CheckedMotion:
         blocks = line.in_order(PhaseKey)
         if not order.is_shown or not blocks:
             return self.checker.evaluate(line)

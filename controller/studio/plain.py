@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from controller.studio.orders import Order, Task
+
 if TYPE_CHECKING:
     from viz.content import Annotation, ReplayContent
 
@@ -12,6 +14,8 @@ UNSOLVED = "dynamic plan"  #: The check that is broken where no jump was found
 ENDS = "entry and exit"  #: The check of how a motion starts and ends
 LAST = "exit"  #: Its subjects at the end begin so
 NO_WAY = "no way to do this was found: ask for less"
+COARSE = "as it is written: the nearest motion that the robot can do is looked for {when}"
+WHEN = {"draft": "when you let go", "meanwhile": "meanwhile", "later": "again with the next edit"}
 LOOKED_FOR = "a way to do this is looked for; until then the robot rests here"
 NOT_HOME = "it must end at rest on four feet, as it begins. All home at the end does that"
 
@@ -22,6 +26,15 @@ def plainly(content: ReplayContent) -> ReplayContent:
         return content
     found = tuple(replace(one, text=_words(one)) for one in content.verdict.annotations)
     return replace(content, verdict=replace(content.verdict, annotations=found))
+
+
+def coarsely(content: ReplayContent, order: Order) -> ReplayContent:
+    """It with the verdict marked as one on what is written, where the nearest is asked for."""
+    if content.verdict is None:
+        return content
+    is_draft, later = order.task is Task.DRAFT, "meanwhile" if order.is_looked_for else "later"
+    why = COARSE.format(when=WHEN["draft" if is_draft else later])
+    return replace(content, verdict=replace(content.verdict, coarse=why))
 
 
 def in_words(one: Annotation) -> str:

@@ -120,8 +120,8 @@ class Studio:
     def told(self) -> str:
         """What there is to say of the jumps of the file; nothing where all of them are solved."""
         if self._is_looking:
-            return f"a jump is looked for meanwhile, for at most {LONGEST_SOLVE:g} s of work"
-        return "" if self._is_solved else f"a jump: {NO_WAY}"
+            return f"what it asks for is looked for meanwhile, for {LONGEST_SOLVE:g} s of work"
+        return "" if self._is_solved else f"what it asks for: {NO_WAY}"
 
     def _look_for_jumps(self) -> None:
         """In the process that plays: edits go on; the plans are kept, and found by the other."""

@@ -29,7 +29,7 @@ from controller.studio.orders import (
     Task,
     TooLong,
 )
-from controller.studio.plain import in_words, is_unsolved, plainly
+from controller.studio.plain import coarsely, in_words, is_unsolved, plainly
 from controller.studio.source import Slot, Source
 from controller.studio.splitting import split
 from go2_wbc.errors import Go2WbcError, StudioError
@@ -176,7 +176,7 @@ def _answer(
         if order.out is not None:
             write_motion(line, order.out, jumps.checker)
             return Answer(motion.name)
-        checked, text = jumps.evaluate(line, order), None
+        (checked, is_coarse), text = jumps.evaluate(line, order), None
         if order.task is Task.PLAY:
             content, told = _played(checked, jumps.checker, order.world, order.ground, teller)
         elif order.task is Task.NEAREST:
@@ -196,9 +196,11 @@ def _answer(
 
     sliders = tuple(slider(item, values.get(item.name, item.default)) for item in motion.parameters)
     content = plainly(replace(worlds.judged(content, order.ground), sliders=sliders))
+    if is_coarse:
+        content = coarsely(content, order)
     bars = tuple(_bars(order, source, made.marks, content))
     shown = content if order.task is Task.EXPORT else prepared(content)
-    is_solved = not is_unsolved(content)
+    is_solved = not (is_unsolved(content) or (is_coarse and order.task is not Task.DRAFT))
     more = {"text": text, "is_solved": is_solved}
     return Answer(motion.name, shown, bars, made.names, told, made.notes, **more)
 

@@ -352,6 +352,7 @@ def _add_verdict(pack: Pack, verdict: Verdict, prefix: str) -> dict[str, object]
         "curves": curves,
         "chance": verdict.chance,
         "world": verdict.world,
+        "coarse": verdict.coarse,
         "certified": None if verdict.certified is None else asdict(verdict.certified),
     }
 

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
 import pytest
 
+from controller.studio.jumping import Jumps
 from controller.studio.nearness import asking, distance
-from controller.studio.orders import STOPPED, Order, Task
+from controller.studio.orders import AT_ONCE, STOPPED, Order, Task, TooLong
 from controller.studio.session import Studio
 from controller.studio.source import Source
 from go2_wbc.errors import StudioError
+from motions import Timeline
 from motions.feasibility.goal_errors import Departure
 from motions.registry import load_text
 from tests.viz.page_reader import read_message, read_pack
@@ -32,6 +35,7 @@ SWAY = f"""{HEAD}    line = Timeline().hold(0.2).body(y=0.06, over=0.2).body(y=-
 """
 ASKED = SWAY.replace("Timeline().", 'Timeline(physics="nearest").')
 AWAY = f"{HEAD}    return Timeline().body(y=0.05, over=0.25).body(y=-0.05, over=0.3)\n"
+NEVER = 0.0617  #: m, of a sway whose nearest motion nobody finds
 LONG = 60.0  #: s, of which a thread needs a few milliseconds
 HELPED = '''
 
@@ -167,5 +171,49 @@ def test_the_nearest_of_a_motion_without_an_end_breaks_a_limit_and_is_not_propos
     answer = studio.nearest({})
     assert isinstance(answer, dict)
     assert str(answer["error"]).startswith(told)
+    file.write_text(SWAY, encoding="utf-8")
+    assert studio.look() or studio.look()
+
+
+def test_what_is_not_found_yet_is_checked_as_it_is_written_and_said_to_be_coarse() -> None:
+    calls = list[int]()
+
+    def progress(iterations: int, _cost: float) -> NoReturn:
+        calls.append(iterations)
+        raise TooLong
+
+    jumps = Jumps(progress)
+    line = Timeline(physics="nearest").body(y=NEVER, over=0.2).body(y=-NEVER, over=0.2)
+    line = line.home(over=0.3).hold(0.3)
+    shown = Order(Path("sway.py"), b"", None, {}, longest=AT_ONCE, is_shown=True)
+    checked, is_coarse = jumps.evaluate(line, shown)
+    assert is_coarse
+    assert calls == [1]
+    written = jumps.checker.check(replace(line, physics="as_written"))
+    assert checked.report.failures == written.failures
+    assert jumps.evaluate(line, replace(shown, task=Task.DRAFT))[1]
+    assert calls == [1], "while something is dragged it is not looked for"
+    with pytest.raises(TooLong):
+        jumps.evaluate(line, replace(shown, is_shown=False))
+    slow = replace(line, physics="as_written")
+    assert not jumps.evaluate(slow, shown)[1]
+
+
+@pytest.mark.slow
+def test_a_draft_is_coarse_until_the_exact_answer_replaces_it(studio: Studio, file: Path) -> None:
+    file.write_text(ASKED, encoding="utf-8")
+    assert studio.look() or studio.look()
+    before = _header(studio._server.changes(""))
+    assert (before["verdict"]["ok"], before["verdict"]["coarse"]) == (True, "")
+    order = {"op": "set", "site": before["editor"]["bars"][4]["site"], "name": "seconds"}
+    order |= {"value": 0.35, "base": before["editor"]["base"]}
+    draft = studio.edit(order)
+    assert isinstance(draft, bytes)
+    verdict = _header(draft)["verdict"]
+    assert not verdict["ok"], "what is written"
+    assert verdict["coarse"].endswith("is looked for when you let go")
+    assert "error" not in dict(studio.edit({**order, "commit": True}))
+    after = _header(studio._server.changes(""))["verdict"]
+    assert (after["ok"], after["coarse"]) == (True, "")
     file.write_text(SWAY, encoding="utf-8")
     assert studio.look() or studio.look()

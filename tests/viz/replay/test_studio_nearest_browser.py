@@ -9,7 +9,7 @@ import pytest
 
 from tests.controller.studio.test_nearness import ASKED, SWAY
 from tests.viz.replay.browsing import Tab
-from tests.viz.replay.studio_tab import SETTLED, undo_all
+from tests.viz.replay.studio_tab import SETTLED, do, undo_all
 
 pytestmark = pytest.mark.slow
 BOX = "document.getElementById('nearest')"
@@ -70,6 +70,11 @@ def test_it_is_taken_by_a_key_and_undone(tab: Tab, file: Path) -> None:
     assert file.read_text(encoding="utf-8") == ASKED
     assert tab.text("#badge").startswith("feasible")
     assert tab.evaluate("replay.data.written !== null"), "what was written stays in sight"
+    do(tab, "studio.set(studio.editor.bars[0], 'seconds', 0.25, false)")
+    assert tab.text("#badge").startswith("coarse: "), "while something is dragged"
+    assert tab.text("#who").endswith("is looked for when you let go.")
+    do(tab, "studio.giveUp()")
+    tab.wait_for("document.getElementById('badge').textContent.startsWith('feasible')")
     undo_all(tab, file, SWAY)
     assert tab.text("#badge") == "5 limits broken"
 

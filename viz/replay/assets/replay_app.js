@@ -48,6 +48,7 @@ class Player {
     if (data.ghost) who.push(data.proposed ? "Blue: the nearest that the robot can do." : "Blue: the plan, which was checked.");
     document.querySelector("[data-ghost=ghost]").firstChild.textContent = data.proposed ? "Nearest" : "Plan";
     if (data.written) who.push("Brown: what was written; the plan is the nearest that the robot can do.");
+    if (data.header.verdict?.coarse) who.push(`Coarse: ${data.header.verdict.coarse}.`);
     document.getElementById("who").textContent = who.join(" ");
   }
 

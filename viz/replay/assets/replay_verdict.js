@@ -23,8 +23,10 @@ class VerdictPanel {
     const { verdict } = data.header;
     document.getElementById("app").classList.toggle("judged", verdict !== null);
     const badge = document.getElementById("badge");
-    badge.textContent = verdict ? verdict.text : "";
-    badge.className = verdict ? `badge ${verdict.ok ? "good" : "bad"}` : "badge";
+    const coarse = verdict?.coarse ?? "";
+    badge.textContent = verdict ? `${coarse && "coarse: "}${verdict.text}` : "";
+    badge.className = verdict ? `badge ${coarse ? "coarse" : verdict.ok ? "good" : "bad"}` : "badge";
+    badge.title = coarse;
     if (!verdict) return;
     showTrust(verdict);
     this.list.replaceChildren(...data.annotations.map((annotation) => this.annotationRow(annotation)));
