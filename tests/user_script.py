@@ -194,8 +194,8 @@ def engine(plan: MotionPlan) -> JointCommand:
 
 def show(recording: Recording) -> None:
     """Pages, films and plots."""
-    verdict = Verdict(ok=True, text="done", annotations=(), curves=())
-    content = ReplayContent(recording, verdict=verdict)
+    verdict = Verdict(ok=True, text="done", annotations=(), curves=(), coarse="")
+    content = ReplayContent(recording, verdict=verdict, proposal=None)
     kinds: list[type] = [Annotation, MarginCurve, Relation]
     export_html(content, Path(f"page{HTML_SUFFIXES[0]}"), title="A page")
     export_animation(content, Path(f"film{ANIMATION_SUFFIXES[0]}"))

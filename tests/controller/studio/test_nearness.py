@@ -212,7 +212,9 @@ def test_a_draft_is_coarse_until_the_exact_answer_replaces_it(studio: Studio, fi
     verdict = _header(draft)["verdict"]
     assert not verdict["ok"], "what is written"
     assert verdict["coarse"].endswith("is looked for when you let go")
-    assert "error" not in dict(studio.edit({**order, "commit": True}))
+    saved = studio.edit({**order, "commit": True})
+    assert isinstance(saved, dict)
+    assert "error" not in saved
     after = _header(studio._server.changes(""))["verdict"]
     assert (after["ok"], after["coarse"]) == (True, "")
     file.write_text(SWAY, encoding="utf-8")

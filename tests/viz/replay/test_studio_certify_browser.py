@@ -9,6 +9,7 @@ import pytest
 from tests.controller.studio.test_certifying import NOD
 from tests.viz.replay.browsing import Tab
 from tests.viz.replay.studio_tab import SETTLED, undo_all
+from tests.viz.replay.test_studio_access_browser import FINDINGS
 
 pytestmark = pytest.mark.slow
 DOING = "document.getElementById('studio-doing')"
@@ -52,6 +53,7 @@ def test_the_interval_is_told_run_by_run_and_stays_as_a_row(tab: Tab, file: Path
     assert cells[1].startswith("friction 0.5 +-10 %")
     assert cells[2:] == ["3 of 3", "29.2 % to 100 %"]
     assert tab.text("#certificate summary b") == "Certificate: done in 3 of 3 runs"
+    assert tab.evaluate(FINDINGS)[1] == []
     assert file.read_text(encoding="utf-8") == NOD
     tab.evaluate("studio.set(studio.editor.bars[0], 'over', 0.7, true)")
     tab.wait_for(f"{SETTLED} && studio.editor.undo")

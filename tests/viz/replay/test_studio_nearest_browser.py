@@ -10,6 +10,7 @@ import pytest
 from tests.controller.studio.test_nearness import ASKED, SWAY
 from tests.viz.replay.browsing import Tab
 from tests.viz.replay.studio_tab import SETTLED, do, undo_all
+from tests.viz.replay.test_studio_access_browser import FINDINGS
 
 pytestmark = pytest.mark.slow
 BOX = "document.getElementById('nearest')"
@@ -58,6 +59,7 @@ def test_it_is_seen_beside_ones_own_and_left(tab: Tab, file: Path) -> None:
     assert tab.evaluate(SEEN) > 20, "a curve beside the margin"
     assert tab.page.locator("#studio-changes button").count() > 0, "changes of all of it, too"
     assert tab.evaluate("document.activeElement.textContent") == "Take it (Y)"
+    assert tab.evaluate(FINDINGS)[1] == []
     tab.page.keyboard.press("Escape")
     tab.wait_for(f"{BOX}.hidden && replay.data.ghost === null")
     assert file.read_text(encoding="utf-8") == SWAY
@@ -73,6 +75,7 @@ def test_it_is_taken_by_a_key_and_undone(tab: Tab, file: Path) -> None:
     do(tab, "studio.set(studio.editor.bars[0], 'seconds', 0.25, false)")
     assert tab.text("#badge").startswith("coarse: "), "while something is dragged"
     assert tab.text("#who").endswith("is looked for when you let go.")
+    assert tab.evaluate(FINDINGS)[1] == []
     do(tab, "studio.giveUp()")
     tab.wait_for("document.getElementById('badge').textContent.startsWith('feasible')")
     undo_all(tab, file, SWAY)
