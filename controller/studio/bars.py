@@ -37,9 +37,7 @@ _SLOT = tuple(field.name for field in fields(Slot) if field.name != "is_choice")
 _DRAFT = ("name", "number", "span", "parts", "broken", "values")  #: What a drag changes of a bar
 
 
-def editor(
-    shown: Answer, project: Project, world: World, ground: Ground
-) -> dict[str, object]:
+def editor(shown: Answer, project: Project, world: World, ground: Ground) -> dict[str, object]:
     """What the page shows of a file that is saved, and what may be asked for."""
     return {
         "bars": [saved(bar) for bar in shown.bars],

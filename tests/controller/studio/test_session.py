@@ -14,6 +14,7 @@ import pytest
 
 from controller.studio import running
 from controller.studio.session import Studio
+from controller.studio.songs import music
 from go2_wbc.errors import StudioError
 from tests.viz.page_reader import read_message, read_pack
 
@@ -302,11 +303,11 @@ def test_another_motion_of_the_file_is_chosen(studio: Studio, file: Path) -> Non
     assert studio.choose({"motion": "greet"}) == {}
 
 
-def test_what_is_no_song_beside_the_file_is_refused(studio: Studio, file: Path) -> None:
+def test_what_is_no_song_beside_the_file_is_refused(file: Path) -> None:
     for name in ("../song.wav", "song.wav", 7):
-        assert "unknown song" in str(studio.music({"name": name})["error"])
+        assert "unknown song" in str(music(file, {"name": name})["error"])
     file.with_name("song.wav").write_bytes(b"no sound")
-    assert "song.wav" in str(studio.music({"name": "song.wav"})["error"])
+    assert "song.wav" in str(music(file, {"name": "song.wav"})["error"])
 
 
 def test_nothing_is_copied_from_where_no_call_ends(studio: Studio) -> None:
