@@ -44,7 +44,10 @@ KINDS: Mapping[str, Kind] = {
     "boxes": Kind("height", "m", 0.01, 0.12, 0.04),
     "waves": Kind("height", "m", 0.01, 0.2, 0.08),
 }
-ONLY_LEVEL = "Verdict, margins and chance are those of level ground; physics plays on the {0.kind}."
+ONLY_LEVEL = (
+    "Verdict, margins, chance and certificate are those of level ground; "
+    "physics plays on the {0.kind}."
+)
 
 
 @dataclass(frozen=True, slots=True)
