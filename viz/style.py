@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 INK = "#1f2937"
-MUTED = "#6b7280"
+MUTED = "#666d7b"
 TRACK = "#d8dee8"
 ACCENT = "#2563eb"
 GOOD = "#15803d"

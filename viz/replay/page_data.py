@@ -361,8 +361,8 @@ HTML_SUFFIXES = (".html", ".htm")
 PAGE_LIMIT = 4_000_000  #: Largest page [bytes]
 _SCRIPTS = "data stage scene ghost steps flags charts binding trust verdict sound app"
 _EDITOR = (
-    "words view tracks inspector proposals nearest hands onion library music world tools doing "
-    "certify tour page"
+    "words coarse view tracks inspector proposals nearest hands onion library music world tools "
+    "doing certify tour page"
 )
 """Of the assets, in the order in which they need one another; a live page has another one, and one
 that edits those of the studio."""

@@ -45,8 +45,8 @@ def test_the_interval_is_told_run_by_run_and_stays_as_a_row(tab: Tab, file: Path
     tab.evaluate("hearing.disconnect()")
     told = tab.evaluate("told")
     live = [text for text in told if text.startswith("done in ") and f"runs, of {RUNS};" in text]
-    assert any(text.startswith("done in 1 of 1 runs") for text in live)
-    assert any("95 % interval 2.5 % to 100 %" in text for text in live)
+    assert live, "while it is counted; a page on a busy computer may miss the first"
+    assert all("95 % interval" in text for text in live)
     assert any("rate-bar" in html for html in told)
     cells = tab.page.locator(f"{ROWS} td").all_inner_texts()
     assert cells[0] == "Nod"

@@ -20,6 +20,7 @@ class Studio {
     this.waiting = null; // the order that is sent when the answer is there; the last one wins
     document.getElementById("app").classList.add("studio");
     this.view = new TimeView(player, () => this.drawTime());
+    this.coarse = new Coarse(player.scene.viewer);
     this.tracks = new Tracks(this, this.view);
     this.music = new Music(this);
     this.doing = new Doing(this);
@@ -251,12 +252,7 @@ class Studio {
 
   // A number or word for an argument of the chosen call; a draft is shown, but not saved. Jumps are
   // solved, which takes up to half a minute: only when they are let go.
-  /**
-   * @param {Bar} bar
-   * @param {string} name
-   * @param {number | string} value
-   * @param {boolean} isCommitted
-   */
+  /** @param {Bar} bar */
   set(bar, name, value, isCommitted) {
     this.setMany(bar, { [name]: value }, isCommitted);
   }
@@ -316,6 +312,7 @@ class Studio {
       return;
     }
     this.isBusy = true;
+    this.coarse.use(!isCommitted);
     this.tools.offer([]);
     this.tell(isCommitted ? "saving…" : "checking…");
     const asked = performance.now();
