@@ -9,7 +9,7 @@ from controller.studio import worlds
 from controller.studio.certifying import RUNS
 from controller.studio.edits import PALETTE
 from controller.studio.exports import EXPORTS
-from controller.studio.grounds import Ground
+from controller.studio.grounds import PlayedGround
 from controller.studio.orders import Answer, Bar
 from controller.studio.project import Project
 from controller.studio.songs import songs_beside
@@ -37,7 +37,9 @@ _SLOT = tuple(field.name for field in fields(Slot) if field.name != "is_choice")
 _DRAFT = ("name", "number", "span", "parts", "broken", "values")  #: What a drag changes of a bar
 
 
-def editor(shown: Answer, project: Project, world: World, ground: Ground) -> dict[str, object]:
+def editor(
+    shown: Answer, project: Project, world: World, ground: PlayedGround
+) -> dict[str, object]:
     """What the page shows of a file that is saved, and what may be asked for."""
     return {
         "bars": [saved(bar) for bar in shown.bars],

@@ -51,7 +51,7 @@ ONLY_LEVEL = (
 
 
 @dataclass(frozen=True, slots=True)
-class Ground:
+class PlayedGround:
     """A ground by its name."""
 
     kind: str = LEVEL  #: or one of ``KINDS``
@@ -99,7 +99,7 @@ class Ground:
         return np.column_stack([places, heights_of(terrain, places)])
 
 
-def ground_of(order: Mapping[str, object]) -> Ground:
+def ground_of(order: Mapping[str, object]) -> PlayedGround:
     """The one that a page asks for by ``ground`` and ``size``; a level one if it does not.
 
     Raises:
@@ -107,7 +107,7 @@ def ground_of(order: Mapping[str, object]) -> Ground:
     """
     name, size = order.get("ground", LEVEL), order.get("size")
     if name == LEVEL:
-        return Ground()
+        return PlayedGround()
     if not isinstance(name, str) or name not in KINDS:
         raise StudioError(unknown_name("ground", f"{name!s:.40}", (LEVEL, *KINDS)))
     kind = KINDS[name]
@@ -117,10 +117,10 @@ def ground_of(order: Mapping[str, object]) -> Ground:
     if not kind.least <= size <= kind.most:
         between = f"must be between {kind.least:g} and {kind.most:g} {kind.unit}"
         raise StudioError(f"{kind.size} {between}, got {size:g}")
-    return Ground(name, float(size))
+    return PlayedGround(name, float(size))
 
 
-def shown(ground: Ground) -> dict[str, object]:
+def shown(ground: PlayedGround) -> dict[str, object]:
     """As the page needs it, with what may be chosen."""
     return {
         "ground": ground.kind,

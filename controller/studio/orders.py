@@ -8,7 +8,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from controller.studio.grounds import Ground
+from controller.studio.grounds import PlayedGround
 from controller.studio.source import Slot
 from controller.studio.syntax import Site
 from go2_wbc.world import World
@@ -68,7 +68,7 @@ class Order:
     out: Path | None = None  #: file that is written
     is_afresh: bool = False  #: what was not found before may have been found since
     world: World = World()  #: it is checked and played in
-    ground: Ground = Ground()  #: it is played on; it is checked on a level one
+    ground: PlayedGround = PlayedGround()  #: it is played on; it is checked on a level one
 
 
 @dataclass(frozen=True, slots=True)

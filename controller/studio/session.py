@@ -14,7 +14,7 @@ from typing import final
 
 from controller.studio import bars, certifying, exports, songs, worlds
 from controller.studio.edits import cut_of, edited, run_of, site_of
-from controller.studio.grounds import Ground, ground_of
+from controller.studio.grounds import PlayedGround, ground_of
 from controller.studio.library import library
 from controller.studio.orders import AT_ONCE, Answer, Bar, Cut, Doing, Order, Task
 from controller.studio.plain import NO_WAY
@@ -66,7 +66,7 @@ class Studio:
         """
         self._project, self._values = Project(path), dict[str, Value]()
         self._lock, self.motion = threading.RLock(), motion
-        self._doing, self._world, self._ground = dict[str, Doing](), World(), Ground()
+        self._doing, self._world, self._ground = dict[str, Doing](), World(), PlayedGround()
         self._runner, self._player = Runner(), Runner()
         self._is_solved = self._is_looking = True  # all that jumps in what is saved; for what does
         self._is_away = False  # the file, when it was looked at last

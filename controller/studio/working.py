@@ -16,7 +16,7 @@ from multiprocessing.synchronize import Event
 from typing import TYPE_CHECKING, final
 
 from controller.studio import worlds
-from controller.studio.grounds import Ground
+from controller.studio.grounds import PlayedGround
 from controller.studio.literals import Run
 from controller.studio.orders import (
     AT_ONCE,
@@ -130,7 +130,7 @@ def serve(pipe: Connection, stop: Event) -> None:
         maker, jumps = Maker(), Jumps(teller)
         if order is None:
             checked = jumps.checker.evaluate(Timeline().body(z=-0.01, over=0.2))
-            _played(checked, jumps.checker, World(), Ground(), teller)
+            _played(checked, jumps.checker, World(), PlayedGround(), teller)
         pipe.send("loaded")
         while True:
             if order is not None:
@@ -223,7 +223,7 @@ def _played(
     checked: CheckedMotion,
     checker: FeasibilityChecker,
     world: World,
-    ground: Ground,
+    ground: PlayedGround,
     teller: Teller,
 ) -> tuple[ReplayContent, str]:
     """The motion in MuJoCo, in the world that it was checked for, and how that went."""
@@ -249,7 +249,7 @@ def _played(
     why = result.fall or result.reason
     share = f"{100 * result.torque:.0f} % of the torque, {100 * result.speed:.0f} % of the speed"
     where = worlds.told(world, ground)
-    where = "" if (world, ground) == (World(), Ground()) else f" ({where})"
+    where = "" if (world, ground) == (World(), PlayedGround()) else f" ({where})"
     done = f"played in MuJoCo{where}: done, {share}"
     return content, done if result.ok else f"NOT done{where}: {why}"
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from controller.studio import grounds
-from controller.studio.grounds import Ground
+from controller.studio.grounds import PlayedGround
 from go2_wbc.errors import ConfigError, StudioError
 from go2_wbc.world import RANGES, SENSORS, World
 
@@ -39,26 +39,26 @@ def world_of(order: Mapping[str, object]) -> World:
         raise StudioError(str(error).replace("World.", "")) from error
 
 
-def told(world: World, ground: Ground) -> str:
+def told(world: World, ground: PlayedGround) -> str:
     """What a motion is played in, in words."""
     return ", ".join(filter(None, (str(world), str(ground))))
 
 
-def judged(content: ReplayContent, ground: Ground) -> ReplayContent:
+def judged(content: ReplayContent, ground: PlayedGround) -> ReplayContent:
     """It with a verdict that says what ground it is of, where physics plays on another one."""
-    if content.verdict is None or ground == Ground():
+    if content.verdict is None or ground == PlayedGround():
         return content
     verdict = replace(content.verdict, world=f"{content.verdict.world}, level ground")
     return replace(content, verdict=verdict)
 
 
-def shown(world: World, ground: Ground) -> dict[str, object]:
+def shown(world: World, ground: PlayedGround) -> dict[str, object]:
     """As the page needs it, with what may be chosen."""
     return {
         **{name: getattr(world, name) for name in (*NUMBERS, "sensors")},
         **grounds.shown(ground),
         "told": told(world, ground),
-        "is_usual": (world, ground) == (World(), Ground()),
+        "is_usual": (world, ground) == (World(), PlayedGround()),
         "ranges": {name: RANGES[name] for name in NUMBERS},
         "choices": SENSORS,
     }

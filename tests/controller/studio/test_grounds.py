@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from controller.studio.grounds import AHEAD, KINDS, LEVEL, Ground, ground_of, shown
+from controller.studio.grounds import AHEAD, KINDS, LEVEL, PlayedGround, ground_of, shown
 from go2_wbc.errors import StudioError
 from go2_wbc.planning.height_map import CELL
 
@@ -31,18 +31,18 @@ def test_every_kind_is_drawn_around_the_way_as_high_as_its_number_says(kind: str
 
 
 def test_stairs_and_slopes_have_the_heights_that_are_asked_for() -> None:
-    x, _, z = Ground("stairs", 0.05).cells(WAY).T
+    x, _, z = PlayedGround("stairs", 0.05).cells(WAY).T
     first = (x > AHEAD + 0.01) & (x < AHEAD + 0.29)
     assert z[first] == pytest.approx(0.05, abs=EXACT)
-    x, _, z = Ground("slope", 10.0).cells(WAY).T
+    x, _, z = PlayedGround("slope", 10.0).cells(WAY).T
     assert z == pytest.approx(x * math.tan(math.radians(10.0)), abs=EXACT)
 
 
 def test_a_level_one_is_drawn_as_no_ground_and_needs_no_warning() -> None:
-    assert Ground().cells(WAY).shape == (0, 3)
-    assert Ground().terrain is None
-    assert (Ground().told(), str(Ground())) == ("", "")
-    assert ground_of({"ground": LEVEL, "size": 3.0}) == ground_of({}) == Ground()
+    assert PlayedGround().cells(WAY).shape == (0, 3)
+    assert PlayedGround().terrain is None
+    assert (PlayedGround().told(), str(PlayedGround())) == ("", "")
+    assert ground_of({"ground": LEVEL, "size": 3.0}) == ground_of({}) == PlayedGround()
 
 
 @pytest.mark.parametrize(
