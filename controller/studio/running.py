@@ -16,7 +16,7 @@ from typing import cast, final
 
 from controller.studio.orders import Answer, Doing, Order
 from controller.studio.working import serve
-from controller.sweeps.engine import ONE_THREAD
+from controller.sweeps.engine import ONE_THREAD, STARTING
 from go2_wbc.errors import StudioError
 
 LONGEST_WAIT = 10.0
@@ -43,11 +43,12 @@ class Runner:
         self._pipe, there = context.Pipe()
         self._stop = context.Event()
         self._process = context.Process(target=serve, args=(there, self._stop), daemon=True)
-        before = os.environ.copy()
-        os.environ.update(ONE_THREAD)  # more would wait for each other, busily
-        self._process.start()
-        os.environ.clear()
-        os.environ.update(before)
+        with STARTING:
+            before = os.environ.copy()
+            os.environ.update(ONE_THREAD)  # more would wait for each other, busily
+            self._process.start()
+            os.environ.clear()
+            os.environ.update(before)
         there.close()
         self._is_warm = False
 

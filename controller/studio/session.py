@@ -73,7 +73,7 @@ class Studio:
         self._changes: tuple[str, ...] = ()
         self._copied: tuple[str, ...] = ()
         self._proposed: tuple[bytes, bytes] | None = None  # what was saved, and the nearest to it
-        self._ending, self._is_searching = threading.Event(), False  # what an edit ends
+        self._searches = set[threading.Event]()  # of what goes on; an edit ends it by its event
         self._motions: tuple[str, ...] = ()
         self._bars: tuple[Bar, ...] = ()
         try:
@@ -172,9 +172,8 @@ class Studio:
                 return {"error": str(error)}
 
     def _done(self, order: Mapping[str, object]) -> dict[str, object] | bytes:
-        if self._is_searching:
-            self._ending.set()
-            self._player.stop()
+        if self._searches:
+            self._end_searches()
         if (op := order.get("op")) in HISTORY:
             (self._project.undo if op == "undo" else self._project.redo)()
             self.show()
@@ -283,9 +282,8 @@ class Studio:
 
     def cancel(self, _: Mapping[str, object]) -> dict[str, object]:
         """End what is solved or played; its request then is answered with an error."""
-        self._ending.set()
+        self._end_searches()
         self._runner.stop()
-        self._player.stop()
         return {}
 
     def highest(self, order: Mapping[str, object]) -> dict[str, object]:
@@ -341,9 +339,9 @@ class Studio:
         data, base, motion = self._project.saved, self._project.base, self.motion or ""
         tell = partial(self._told_of, "certify")
         try:
-            with self._search_ended_by_edits():
+            with self._search_ended_by_edits() as ending:
                 around = self._writer(), order, self._world
-                rate = certifying.certified(*around, tell, self._ending)
+                rate = certifying.certified(*around, tell, ending)
         except Go2WbcError as error:
             return {"error": str(error)}
         finally:
@@ -356,13 +354,18 @@ class Studio:
         return {"row": certifying.row_of(rate, motion, base)}
 
     @contextmanager
-    def _search_ended_by_edits(self) -> Iterator[None]:
-        self._ending.clear()
-        self._is_searching = True
+    def _search_ended_by_edits(self) -> Iterator[threading.Event]:
+        ending = threading.Event()  # its own: one that begins does not revive another
+        self._searches.add(ending)
         try:
-            yield
+            yield ending
         finally:
-            self._is_searching = False
+            self._searches.remove(ending)
+
+    def _end_searches(self) -> None:
+        for ending in tuple(self._searches):
+            ending.set()
+        self._player.stop()
 
     def export(self, order: Mapping[str, object]) -> dict[str, object]:
         """Write what is saved beside the file: see ``exports.exported``."""

@@ -46,6 +46,8 @@ ONE_THREAD = {
 """The environment of every worker. As many threads as cores in each of as many workers would get in
 each other's way, and a sum split over another number of threads has other bits; so has one in the
 order of a set of strings."""
+STARTING = threading.Lock()
+"""Held while a process starts: the environment of this one is another meanwhile, in all threads."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,14 +292,15 @@ class Worker:
         """
         context = multiprocessing.get_context("forkserver" if sys.platform == "linux" else "spawn")
         self._pipe, its_end = context.Pipe()
-        arguments = (its_end, order, {**os.environ, **ONE_THREAD}, *memory)
-        self._process = context.Process(target=serve, args=arguments, name="worker")
-        with its_end, _start():
-            try:
-                self._process.start()
-            except (EOFError, OSError):  # the server of processes is just dying
-                time.sleep(DYING)
-                self._process.start()
+        with its_end, STARTING:
+            arguments = (its_end, order, {**os.environ, **ONE_THREAD}, *memory)
+            self._process = context.Process(target=serve, args=arguments, name="worker")
+            with _start():
+                try:
+                    self._process.start()
+                except (EOFError, OSError):  # the server of processes is just dying
+                    time.sleep(DYING)
+                    self._process.start()
         self.handles = (self._pipe, self._process.sentinel)
 
     def give(self, item: bytes) -> None:

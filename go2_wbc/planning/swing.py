@@ -174,10 +174,12 @@ def resume_swing(swing: Swing, leg: int, now: Snapshot, ground: Ground, progress
 @subroutine
 def lead_beyond(swing: Swing, velocity: tuple[float, float], ground: Ground, goal: Array3) -> None:
     """Move a goal [m] ahead, on the robot's way at ``velocity`` [m/s], as far as a swing asks."""
+    if swing.beyond == 0.0:
+        return
     speed = max(np.hypot(velocity[0], velocity[1]), TIE)
     x, y = velocity[0] / speed, velocity[1] / speed
     way = (goal[0] - swing.start[0]) * x + (goal[1] - swing.start[1]) * y
-    missing = max(swing.beyond - way, 0.0) if swing.beyond > 0.0 else 0.0
+    missing = max(swing.beyond - way, 0.0)
     goal[0] += missing * x
     goal[1] += missing * y
     goal[2] += missing * (ground.slope[0] * x + ground.slope[1] * y)

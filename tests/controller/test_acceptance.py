@@ -34,7 +34,7 @@ class Holding(MotionPlan):
     duration: float = 4.0
 
     def at(self, t: float) -> Reference:
-        raise NotImplementedError
+        raise AssertionError(f"only its held feet are asked for, not {t:.2f} s of it")
 
     @property
     def held_feet(self) -> tuple[HeldFoot, ...]:

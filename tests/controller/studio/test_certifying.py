@@ -87,3 +87,20 @@ def test_the_next_edit_ends_it(studio: Studio, monkeypatch: pytest.MonkeyPatch) 
     assert isinstance(studio.edit({**order, "base": editor["base"]}), bytes)
     count.join()
     assert answers == [{"error": STOPPED}]
+
+
+@pytest.mark.slow
+def test_one_that_was_ended_stays_so_when_the_next_begins(
+    studio: Studio, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, answers = threading.Event(), list[object]()
+    monkeypatch.setattr(
+        studio, "_told_of", lambda which, one: begun.set() if which == "certify" else None
+    )
+    count = threading.Thread(target=lambda: answers.append(studio.certify({"runs": 200})))
+    count.start()
+    assert begun.wait(60.0)
+    studio.cancel({})
+    assert "row" in studio.certify({"runs": 1})
+    count.join(60.0)
+    assert answers == [{"error": STOPPED}]
