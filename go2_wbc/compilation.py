@@ -58,6 +58,7 @@ MODULES = (
     "go2_wbc.planning.locomotion",
     "go2_wbc.planning.rest",
     "go2_wbc.plant.mujoco.forces",
+    "go2_wbc.plant.sensors",
     "go2_wbc.reference",
     "go2_wbc.robot.estimator",
     "go2_wbc.robot.latency",

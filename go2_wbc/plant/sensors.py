@@ -11,6 +11,8 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.brief import brief
+from go2_wbc.compilation import Foreign, kernel, subroutine
+from go2_wbc.records import Array3, Array4, Array12, packed
 from go2_wbc.robot.estimator import EstimatorConfig, StateEstimator
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import OdometryCovariance, PartFault, RobotState, SensorReading
@@ -140,6 +142,39 @@ class SensorErrors:
     latency: float = 0.002
 
 
+@subroutine
+def in_steps(value: float, step: float) -> float:
+    """The nearest multiple of ``step``; 0 leaves the value alone."""
+    return step * np.rint(value / step) if step > 0.0 else value
+
+
+@kernel
+def read_sensors(
+    errors: SensorErrors,
+    bias: Float[np.ndarray, "6"],
+    noise: Float[np.ndarray, "22"],
+    gyro: Foreign[Array3],
+    accelerometer: Foreign[Array3],
+    q_joints: Foreign[Array12],
+    v_joints: Foreign[Array12],
+    foot_forces: Foreign[Array4],
+    read: Float[np.ndarray, "34"],
+) -> None:
+    """Fill ``read`` with what the sensors say of these, in this order.
+
+    ``bias`` of gyro and accelerometer; ``noise``, standard normal, of both, speeds and forces.
+    """
+    for k in range(3):
+        read[k] = gyro[k] + bias[k] + errors.gyro * noise[k]
+        read[3 + k] = accelerometer[k] + bias[3 + k] + errors.accelerometer * noise[3 + k]
+    for j in range(12):
+        read[6 + j] = in_steps(q_joints[j], errors.angle_step)
+        read[18 + j] = in_steps(v_joints[j] + errors.speed * noise[6 + j], errors.speed_step)
+    for leg in range(4):
+        force = max(foot_forces[leg] + errors.force * noise[18 + leg], 0.0)
+        read[30 + leg] = in_steps(force, errors.force_step)
+
+
 @final
 class Proprioception:
     """The state as a robot knows it: read with errors, late, and estimated from nothing else."""
@@ -156,11 +191,11 @@ class Proprioception:
 
         ``model``: what the robot knows of itself.
         """
-        self._errors, self._rng, self._config = errors, rng, estimator
+        self._errors, self._rng, self._config = packed(errors), rng, estimator
         self._late = round(errors.latency / period)
         self._model = model
-        self._gyro_bias = errors.gyro_bias * rng.standard_normal(3)
-        self._force_bias = errors.accelerometer_bias * rng.standard_normal(3)
+        biases = np.repeat([errors.gyro_bias, errors.accelerometer_bias], 3)
+        self._bias = biases * rng.standard_normal(6)
         self.restart()
 
     def restart(self) -> None:
@@ -196,18 +231,12 @@ class Proprioception:
         return self._estimator.covariance()
 
     def _read(self, true: RobotState, imu: ImuSample) -> SensorReading:
-        errors, noise = self._errors, self._rng.standard_normal(22)
-        speeds = true.joint_velocities + errors.speed * noise[6:18]
-        forces = np.maximum(true.foot_forces + errors.force * noise[18:], 0.0)
-        return SensorReading(
-            time=true.time,
-            gyro=imu.gyro + self._gyro_bias + errors.gyro * noise[:3],
-            accelerometer=imu.accelerometer + self._force_bias + errors.accelerometer * noise[3:6],
-            q_joints=_in_steps(true.joint_positions, errors.angle_step),
-            v_joints=_in_steps(speeds, errors.speed_step),
-            tau=true.tau,
-            foot_forces=_in_steps(forces, errors.force_step),
-        )
+        read, noise = np.empty(34), self._rng.standard_normal(22)
+        joints = true.joint_positions, true.joint_velocities
+        imu_says = imu.gyro, imu.accelerometer
+        read_sensors(self._errors, self._bias, noise, *imu_says, *joints, true.foot_forces, read)
+        q, v = read[6:18], read[18:30]
+        return SensorReading(true.time, read[:3], read[3:6], q, v, true.tau, read[30:])
 
     def save(self) -> Mapping[str, Any]:
         """All that the next states depend on, besides the generator."""
@@ -217,8 +246,3 @@ class Proprioception:
         """Go back to what ``save`` returned."""
         self._estimator.restore(saved["estimator"])
         self._waiting = deque(saved["waiting"])
-
-
-def _in_steps(values: Float[np.ndarray, " n"], step: float) -> Float[np.ndarray, " n"]:
-    """Each value at the nearest multiple of ``step``; 0 leaves them alone."""
-    return step * np.rint(values / step) if step > 0.0 else values.copy()

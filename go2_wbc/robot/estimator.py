@@ -98,6 +98,8 @@ from go2_wbc.robot.state_filter import (
     turn_world_about_robot,
 )
 
+_TAKEN = ("gyro", "accelerometer", "q_joints", "v_joints", "foot_forces")
+"""What of a reading the filter takes."""
 _START_DEVIATIONS = (0.001, 0.1, 0.01)
 """Of position [m], velocity [m/s] and feet [m] when the filter begins (own choice); the position is
 the origin by definition."""
@@ -263,6 +265,7 @@ class StateEstimator:
         zeros = np.zeros(12)
         reading = SensorReading(0.0, zeros[:3], zeros[:3], zeros, zeros, zeros, zeros[:4])
         self._reading, self._state = packed(reading), EstimatorState()
+        self._taken = [getattr(self._reading, name) for name in _TAKEN]
         self._x, self._P = self._state.filter.x, self._state.filter.P
         self._x.quaternion[3] = 1.0
         self.watch = SensorWatch(model) if watches else None
@@ -308,10 +311,8 @@ class StateEstimator:
             self._P[doubted, doubted] += deviation**2
 
     def _read(self, reading: SensorReading) -> None:
-        taken = self._reading
-        taken.gyro[:], taken.accelerometer[:] = reading.gyro, reading.accelerometer
-        taken.q_joints[:], taken.v_joints[:] = reading.q_joints, reading.v_joints
-        taken.foot_forces[:] = reading.foot_forces
+        for taken, name in zip(self._taken, _TAKEN, strict=True):
+            taken[:] = getattr(reading, name)
 
     def covariance(self) -> OdometryCovariance:
         """How sure the last state is of the base, from the covariance of the filter's errors.

@@ -484,15 +484,15 @@ class MujocoPlant(Plant):
             self._state, self._imu = self._senses.sense(self.truth(), self._true_imu(), *given)
 
     def _true_imu(self) -> ImuSample:
-        sensor = self._data.sensor
-        quaternion = sensor(ORIENTATION).data[[1, 2, 3, 0]]
-        return ImuSample(quaternion, sensor(GYRO).data.copy(), sensor(ACCELEROMETER).data.copy())
+        quaternion, gyro, accelerometer = self._sensed
+        return ImuSample(quaternion[[1, 2, 3, 0]], gyro.copy(), accelerometer.copy())
 
     def _bind_kernels(self) -> None:
         """Binds the kernels of a tick and the arrays of MuJoCo's that they read and fill."""
         data, layout = self._data, self._layout
         places = np.array([layout.joint_q, layout.joint_v, layout.motors], dtype=np.int64)
         self._motors = (packed(self._motor), places, data.qpos, data.qvel, data.ctrl)
+        self._sensed = [data.sensor(n).data for n in (ORIENTATION, GYRO, ACCELEROMETER)]
         state = (data.qpos, data.qvel, self._R_world_base)
         base = (layout.base_q.start, layout.base_v.start)
         self._read_joints = partial(read_joints, *state, *base, places)
