@@ -38,6 +38,10 @@ is not put back. At 0.5 a push of 50 N s ahead threw a trot of 0.5 m/s over feet
 SEEN_STRIDE = Stride(reach=0.25, stance_min=0.25, stance_max=0.25, swing=0.25, swing_slope=0.0)
 """Of a trot on uneven ground that is seen."""
 Phases = tuple[float, float, float, float]  #: At which the feet touch down, of FL, FR, RL and RR
+WAITING = 0.5
+"""How fast, as a share, the gait goes on while a foot that was stopped at a step rises. At 1 m/s it
+had 40 ms for that: it was still below the edge as the pair that stood was lifted, nothing stood for
+up to 0.1 s, and the trunk fell onto the step."""
 _RESOLUTION = 1e12  #: Of phases, that adding and dividing may have blurred, in steps a turn
 
 
@@ -86,6 +90,7 @@ class Clock(Record):
     offsets: Float[np.ndarray, "4"]  #: of the same
     width: float  #: of the same
     goal: Float[np.ndarray, "4"]  #: offsets to which those of now were aligned
+    is_waiting: bool  #: whether it goes on slowly, for a foot that was stopped
     is_rough: bool  #: whether its strides are those on rough ground
     is_seen: bool  #: whether they are those on uneven ground that is seen
 
@@ -116,6 +121,12 @@ def foot_phase(clock: Clock, leg: int) -> tuple[bool, float, float]:
     if elapsed < stance_time - TIE:
         return True, max(elapsed, 0.0), stance_time - elapsed
     return False, max(elapsed - stance_time, 0.0), period - elapsed
+
+
+@subroutine
+def pace(clock: Clock) -> float:
+    """How fast the gait goes on, as a share."""
+    return WAITING if clock.is_waiting else 1.0
 
 
 @subroutine

@@ -23,7 +23,7 @@ from go2_wbc.errors import CommandError
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.footholds import foothold, goes_as_told, nominal_feet
 from go2_wbc.planning.force_mpc import apply_force_plan
-from go2_wbc.planning.gait_clock import adapt, foot_phase, restart
+from go2_wbc.planning.gait_clock import adapt, foot_phase, pace, restart
 from go2_wbc.planning.ground import (
     LATE,
     LEAST_FRICTION,
@@ -62,8 +62,10 @@ from go2_wbc.planning.swing import (
     Swing,
     begin_swing,
     follow_contact,
+    is_held_up,
     lead_beyond,
     loaded_time,
+    own_progress,
     resume_swing,
     swing_foot,
 )
@@ -132,10 +134,21 @@ def hurry(now: Snapshot, s: Planner, c: Walk) -> float:
 
 
 @subroutine
+def is_waiting(s: Planner) -> bool:
+    """Whether the gait waits for a foot."""
+    for leg in range(4):
+        foot = s.feet[leg]
+        if is_held_up(foot.swing, foot.contact, s.clock, leg):
+            return True
+    return False
+
+
+@subroutine
 def advance_phase(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -> None:
     """Start, go on, or come to rest."""
     if s.is_stepping:
-        s.clock.time += dt * (1.0 + hurry(now, s, c))
+        s.clock.is_waiting = is_waiting(s)
+        s.clock.time += dt * pace(s.clock) * (1.0 + hurry(now, s, c))
         if not is_zero(command):
             s.rest.landings = 0.0
         elif may_rest(now, s, c):
@@ -208,9 +221,10 @@ def note_liftoffs(
     learn_ground(s.ground, now, c.foot_radius, met, s.delay)
     if stumbles.any():
         note_stumble(s.ground)
+    is_fast = np.hypot(s.trunk.velocity[0], s.trunk.velocity[1]) > c.config.rough.speed + TIE
     for leg in range(4):
         if stumbles[leg]:
-            resume_swing(s.feet[leg].swing, leg, now, s.ground, progress[leg])
+            resume_swing(s.feet[leg].swing, leg, now, s.ground, progress[leg], is_fast)
 
 
 @subroutine
@@ -291,7 +305,9 @@ def plan(
         above = p[2] - c.foot_radius - ground_at(s.ground, p[0], p[1])
         if s.feet[leg].step.is_sighted:
             above = height_to_land(m, p[0], p[1], p[2] - c.foot_radius)
-        stands[leg] = follow_contact(foot, above, contact[leg], stance[leg], progress[leg], dt)
+        swing = s.feet[leg].swing
+        own = own_progress(swing, progress[leg]) if swing.is_awaited else progress[leg]
+        stands[leg] = follow_contact(foot, above, contact[leg], stance[leg], own, dt)
     steps, beside = s.is_stepping, c.stands_beside_com
     observe_slip(s.slip, now, contact, tau, stands, steps, beside, dt)
     note_liftoffs(now, s, c, contact, stance, progress)

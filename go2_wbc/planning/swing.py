@@ -13,6 +13,8 @@ learnt of the ground meanwhile is for the next swing: a curve that was changed o
 that is stopped in the middle of its swing begins another one where it is, in the time that is left:
 it rises along what it has met before it goes on, and comes down well beyond: at the edge of a step,
 where it was led before, it slipped off, the trunk dropped, and its nose met the face of the next.
+Where the robot is faster than it shall be on rough ground, the gait waits while such a foot rises,
+which does not stand by touching the face meanwhile.
 
 Those feet of a gait stand that shall, and those that have found a step before they do. A foot that
 meets something above the ground, late in its swing, stands from then on. If it went on towards its
@@ -35,7 +37,7 @@ import numpy as np
 
 from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
-from go2_wbc.planning.gait_clock import Clock
+from go2_wbc.planning.gait_clock import Clock, foot_phase, pace
 from go2_wbc.planning.ground import (
     Ground,
     RoughConfig,
@@ -77,7 +79,7 @@ def follow_contact(
         above: height [m] of the foot above the ground as it is known.
         touches: whether a contact is measured.
         planned: whether it shall stand.
-        progress: share of its swing that has passed.
+        progress: share of its swing that has passed, anew if it was stopped in that.
     """
     if planned:
         foot.is_early = False
@@ -130,6 +132,7 @@ class Swing(Record):
     delay: float  #: share of it in which the foot only rises
     begun: float  #: share of the gait's swing that had passed by then
     beyond: float  #: how far [m] ahead of its start it ends at least; 0 for wherever it is led
+    is_awaited: bool  #: whether the gait waits while it rises, stopped in a fast way
     peak: float
     """Share of it at which the foot is highest; 0 until that is settled, at its first tick."""
 
@@ -152,23 +155,40 @@ def begin_swing(swing: Swing, p_foot: Array3, ground: Ground, c: RoughConfig) ->
     """A foot leaves the ground."""
     swing.start[:] = p_foot
     swing.raised, swing.delay, swing.begun = apex_raise(ground, c), delay(ground), 0.0
-    swing.beyond = 0.0
+    swing.beyond, swing.is_awaited = 0.0, False
     swing.peak = 0.0 if is_rough(ground) else 0.5
 
 
 @subroutine
-def resume_swing(swing: Swing, leg: int, now: Snapshot, ground: Ground, progress: float) -> None:
+def resume_swing(
+    swing: Swing, leg: int, now: Snapshot, ground: Ground, progress: float, is_fast: bool
+) -> None:
     """A foot has been stopped at ``progress``; it goes on from there, once in a swing.
 
     It is raised as high as the time allows that is left: to lift one by 7 cm more within 44 ms took
-    590 N from the standing feet.
+    590 N from the standing feet. The gait waits for it if the robot ``is_fast``.
     """
     if swing.begun == 0.0:
         is_step = is_rough(ground) or is_met_rough(ground, now)
         swing.start[:] = now.p_world_feet[leg]
         swing.raised, swing.beyond = (ABOVE, BEYOND) if is_step else (0.0, 0.0)
         swing.delay, swing.begun = delay(ground), progress
-        swing.peak = 0.5
+        swing.peak, swing.is_awaited = 0.5, is_step and is_fast
+
+
+@subroutine
+def own_progress(swing: Swing, progress: float) -> float:
+    """Share that has passed of a swing that may have begun anew, at ``progress`` of the gait's."""
+    return (progress - swing.begun) / (1.0 - swing.begun)
+
+
+@subroutine
+def is_held_up(swing: Swing, foot: FootContact, clock: Clock, leg: int) -> bool:
+    """Whether a foot that the gait waits for rises yet."""
+    stands, elapsed, remaining = foot_phase(clock, leg)
+    if stands or foot.is_early or not swing.is_awaited:
+        return False
+    return own_progress(swing, elapsed / (elapsed + remaining)) < swing.peak
 
 
 @subroutine
@@ -217,8 +237,8 @@ def swing_foot(
         land: height [m] at which it shall touch down there.
     """
     share = 1.0 - swing.begun
-    progress = (progress - swing.begun) / share
-    duration = share * (1.0 - clock.duty) * clock.period
+    progress = own_progress(swing, progress)
+    duration = share * (1.0 - clock.duty) * clock.period / pace(clock)
     start, late = swing.start, swing.delay
     span = duration * (1.0 - late)
     x, dx, ddx = 0.0, 0.0, 0.0

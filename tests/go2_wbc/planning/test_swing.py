@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from go2_wbc.contacts import GAITS, ContactPhase
 from go2_wbc.planning.command import VelocityCommand
-from go2_wbc.planning.gait_clock import Clock
+from go2_wbc.planning.gait_clock import WAITING, Clock
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.planning.swing import (
     ABOVE,
@@ -205,6 +205,52 @@ def test_a_foot_that_was_stopped_rises_well_above_and_comes_down_well_beyond_tha
     most = left * (LocomotionConfig().swing.apex + ABOVE)
     assert feet[:, 2].max() - place[2] == pytest.approx(most, abs=0.01)
     assert feet[-1, 0] - place[0] == pytest.approx(BEYOND, abs=0.01)
+
+
+HIGH = 0.05  # m of a foot above the ground when it may have come onto a step
+
+
+def stopped(speed: float, *, presses: bool = False) -> tuple[list[Reference], float]:
+    """A first swing of a robot told to go at ``speed``, in which a foot is stopped.
+
+    Returns its references from there on, and the time [s] at which the foot stands. If it
+    ``presses`` it touches the step again, high above the ground, as soon as others may land.
+    """
+    model = helpers.symmetric_model()
+    start = model.snapshot(helpers.state_of(helpers.standing_q()))
+    planner, found = LocomotionPlanner(model, GAITS["trot"], LocomotionConfig()), []
+    planner.start(start, friction=0.6)
+    planner._state.ground.height -= HIGH
+    for n in range(2 * round(SWING / TICK)):
+        touches = n == STUMBLE or (presses and n * TICK >= EARLIEST * SWING)
+        contact = np.array([touches, True, True, False])
+        state = replace(start.state, time=n * TICK, feet_in_contact=contact)
+        reference = planner.update(start.replaced(state=state), VelocityCommand(speed))
+        if n > STUMBLE and reference.stance[0]:
+            break
+        if n > STUMBLE:
+            found.append(reference)
+    return found, n * TICK
+
+
+def test_the_gait_waits_for_a_foot_that_is_stopped_while_the_robot_is_fast() -> None:
+    # At 1 m/s it had 40 ms to rise, and was still below the edge as the others lifted.
+    _, slow = stopped(0.5)
+    ways, fast = stopped(1.0)
+    rise = 0.5 * (SWING - STUMBLE * TICK)
+    assert slow == pytest.approx(SWING, abs=0.015)  # a little more of the stride on rough ground
+    assert fast - slow == pytest.approx(rise / WAITING - rise, abs=0.01)
+    heights = np.array([one.p_world_feet[[0, 3], 2] for one in ways[:20]])
+    speeds = np.array([one.v_world_feet[[0, 3], 2] for one in ways[1:19]])
+    found = (heights[2:] - heights[:-2]) / (2.0 * TICK)
+    assert np.median(found / speeds) == pytest.approx(1.0, abs=0.25)  # the form changes meanwhile
+
+
+def test_a_face_that_a_foot_touches_as_it_rises_along_it_is_no_landing() -> None:
+    _, landed = stopped(1.0, presses=True)
+    begun = STUMBLE * TICK
+    risen = begun + 0.5 * (SWING - begun) / WAITING
+    assert landed == pytest.approx(risen + (EARLIEST - 0.5) * (SWING - begun), abs=0.01)
 
 
 @dataclass
