@@ -94,3 +94,28 @@ def test_the_planner_compiled_is_the_planner_as_it_is_written(
     assert (seen > TICKS // 4) == (terrain is not None)
     assert next(plans) >= 30
     assert len(frictions) > 3
+
+
+def test_a_gait_that_waits_is_compiled_as_it_is_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    def not_solved(c: MpcConfig, h: Horizon) -> int:
+        raise Skipped
+
+    monkeypatch.setattr(force_mpc, "solve_mpc", not_solved)
+    model, stopped, compared = RobotModel(), 44, 0
+    start = model.snapshot(state_of(standing_q()))
+    planner = LocomotionPlanner(model, GAITS["trot"], LocomotionConfig())
+    planner.start(start, friction=0.6)
+    for tick in range(stopped + 20):
+        contact = np.array([tick == stopped, True, True, False])
+        now = start.replaced(state=replace(start.state, time=tick * TICK, feet_in_contact=contact))
+        state, target = type(planner._state).of(planner._state.row.copy()), Target()
+        reference = planner.update(now, VelocityCommand(1.0))
+        if not planner._state.clock.is_waiting:
+            continue
+        told = contact, now.state.tau, state, planner._walk, planner._command
+        with suppress(Skipped):
+            plain(plan)(now, np.float64(now.state.time), *told, target, planner._heights)
+            np.testing.assert_allclose(target.row, reference.row, rtol=0, atol=ROUNDING)
+            np.testing.assert_allclose(state.row, planner._state.row, rtol=0, atol=ROUNDING)
+            compared += 1
+    assert compared > 5
