@@ -230,7 +230,7 @@ def stopped(speed: float, *, presses: bool = False) -> tuple[list[Reference], fl
             break
         if n > STUMBLE:
             found.append(reference)
-    return found, n * TICK
+    return found, (STUMBLE + 1 + len(found)) * TICK
 
 
 def test_the_gait_waits_for_a_foot_that_is_stopped_while_the_robot_is_fast() -> None:
