@@ -19,11 +19,12 @@ from matplotlib.figure import Figure
 
 from benchmarks.command import Jobs, Output, RowsFile, positive, run_sweep
 from benchmarks.probability_fit import Calibration, Sample, calibration, fit_model
-from benchmarks.probability_runs import DRAWN, motion_and_world, seeds, trial
+from benchmarks.probability_runs import DRAWN, exam, motion_and_world, seeds, trial
 from benchmarks.validation_set.drawing import TEST, TRAIN
 from controller.cli.common import output, plot_file
 from controller.sweeps.summary import rate_interval
 from controller.sweeps.sweep_file import Row
+from go2_wbc.errors import CommandError
 from go2_wbc.files import write_atomically
 from motions.feasibility.report import FILE, ProbabilityModel, fitted
 from viz.style import ACCENT, INK, MUTED, STYLE, TRACK, save_figure
@@ -62,6 +63,10 @@ def run(
     python -m benchmarks probability --data docs/data/probability.csv
                                      --plot docs/images/reliability.svg
     """
+    least = 1 + next(n for n, one in enumerate(exam()) if one.family.half == TEST)
+    if motions is not None and motions < least:
+        told = f"none of the first {motions} is of the test half, which judges"
+        raise CommandError(f"--motions must be {least} or more: {told}")
     result = run_sweep("probability", trial, seeds(motions), rows=rows, jobs=jobs)
     found, model = result.rows, fitted()
     if fit:

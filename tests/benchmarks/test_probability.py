@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.command import Output
 from benchmarks.probability import (
     COLUMNS,
     csv_of,
     judge,
     passed_that_fell,
     render,
+    run,
     save_reliability,
     store,
 )
@@ -23,6 +25,7 @@ from benchmarks.probability_fit import Sample, _loss, calibration, fit_model
 from benchmarks.probability_runs import PAYLOAD, WORLDS, exam, mixed, runs, world_of
 from benchmarks.validation_set.drawing import TEST, TRAIN
 from controller.sweeps.sweep_file import Row
+from go2_wbc.errors import CommandError
 from motions.feasibility.report import ProbabilityModel, Rise
 
 MODEL = ProbabilityModel({"slip": Rise(0.01, 0.0, 0.4)}, rest=3.0, leak=0.05)
@@ -80,6 +83,12 @@ def test_the_diagram_has_a_point_for_every_bin_with_runs(tmp_path: Path) -> None
     assert "20 runs of the test half" in text
     assert "chance stated" in text
     assert all(f">{count}<" in text for *_, count in judged.bins)
+
+
+def test_motions_of_which_none_judges_are_refused_before_one_is_played() -> None:
+    first = next(number for number, one in enumerate(exam()) if one.family.half == TEST)
+    with pytest.raises(CommandError, match=f"--motions must be {first + 1} or more"):
+        run(motions=first, output=Output())
 
 
 # --- the fit ----------------------------------------------------------------------------------
