@@ -154,7 +154,8 @@ class ControlLoop:
             # What a limp robot's joint is asked for changes with its speed, also within a tick.
             is_limp = isinstance(self.behaviour, Damped)
             if self._observe() and self.plant.motors_obey and not is_limp:
-                self._motors.update(self._acted, self.state, self.plant.control_period)
+                acted = self._commands[max(-1 - self.latency.acted, -len(self._commands))]
+                self._motors.update(acted, self.state, self.plant.control_period)
             self._look_after_parts()
             self._guard()
             self._feel()
@@ -231,11 +232,6 @@ class ControlLoop:
             grave = [str(fault) for fault in faults if not fault.is_survived]
             if grave:
                 self.abandon(Fault("; ".join(grave), may_fall=True))
-
-    @property
-    def _acted(self) -> JointCommand:
-        """The command that has acted until now."""
-        return self._commands[max(-1 - self.latency.acted, -len(self._commands))]
 
     def _watch_feet(self, target: Reference | JointReference | Shared) -> None:
         if not (isinstance(target, Reference) and self.plant.motors_obey):

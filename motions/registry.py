@@ -61,16 +61,11 @@ def load_motion(name: str | Path, **values: Value) -> Timeline:
         TimelineError: for a parameter that is not valid; a file has none.
         MotionFileError: if the file is missing, damaged, or not what ``save_motion`` wrote.
     """
-    if not is_saved_motion(name):
+    if not str(name).endswith(MOTION_FORMAT.suffix):
         return find_motion(str(name))(**values)
     if values:
         raise TimelineError(f"{name}: a saved motion has no parameters, got {', '.join(values)}")
     return read_motion(name)
-
-
-def is_saved_motion(name: str | Path) -> bool:
-    """Whether ``name`` is that of a file from ``save_motion``, by its ending."""
-    return str(name).endswith(MOTION_FORMAT.suffix)
 
 
 @typed()

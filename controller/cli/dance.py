@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -114,14 +115,14 @@ def _accents(dance: Dance, heard: DancedAccents) -> dict[str, Any]:
     return {
         "on_beat": heard.share_on(heard.wanted),
         "accents": [
-            {"time": round(dance.time(accent), 3), "part": accent.part, "late_ms": _rounded(error)}
+            {
+                "time": round(dance.time(accent), 3),
+                "part": accent.part,
+                "late_ms": None if math.isnan(error) else round(error, 1),  # it did not happen
+            }
             for accent, error in zip(dance.accents, late.tolist(), strict=True)
         ],
     }
-
-
-def _rounded(error: float) -> float | None:
-    return round(error, 1) if error == error else None  # nan: it did not happen
 
 
 def _told(song: Path, found: Beats, dance: Dance) -> dict[str, Any]:

@@ -158,7 +158,7 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
         self._workers = [Worker(order_of(share), self._memory) for share in shares[:-1]]
         self._trouble = ""  # why they cannot be stepped any more
         # Also of one that nobody closes: Python would wait for them at its exit.
-        self._end = Finalize(self, _end_all, [self._workers], exitpriority=0)
+        self._end = Finalize(self, lambda all: [one.end() for one in all], [self._workers], None, 0)
 
     def reset(
         self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
@@ -260,8 +260,3 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
             "command": command,
             "_command": np.ones(self.num_envs, dtype=bool),
         }
-
-
-def _end_all(workers: Sequence[Worker]) -> None:
-    for worker in workers:
-        worker.end()

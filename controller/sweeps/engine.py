@@ -21,7 +21,7 @@ import time
 import traceback
 from abc import ABC, abstractmethod
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache, lru_cache
@@ -245,7 +245,8 @@ class LocalEngine(Engine):
             while trials.waiting or busy:
                 while trials.waiting and len(busy) < self._workers:
                     _give(Worker(order), trials, busy)
-                for worker in _with_news(busy):
+                ready = connection.wait([handle for one in busy for handle in one.handles])
+                for worker in [one for one in busy if any(map(ready.__contains__, one.handles))]:
                     number, answer = busy.pop(worker), worker.answer()
                     if answer is not None:
                         _give(worker, trials, busy)  # before the caller takes its time
@@ -266,12 +267,6 @@ def _give(worker: Worker, trials: Trials[Any], busy: dict[Worker, int]) -> None:
         return
     busy[worker] = trials.waiting.popleft()
     worker.give(trials.pickled[busy[worker]])
-
-
-def _with_news(workers: Collection[Worker]) -> list[Worker]:
-    """Those that have answered or ended, at least one."""
-    ready = connection.wait([handle for worker in workers for handle in worker.handles])
-    return [worker for worker in workers if any(handle in ready for handle in worker.handles)]
 
 
 @final

@@ -15,7 +15,7 @@ from typing import Any
 
 from controller.sweeps.engine import Engine, Failure, LocalEngine, processors
 from controller.sweeps.sweep_file import SEED, Columns, Row, SweepFile
-from controller.sweeps.targets import digest, target_of
+from controller.sweeps.targets import digest, identity, target_of
 from go2_wbc.arguments import typed
 from go2_wbc.brief import brief, inline_html
 from go2_wbc.errors import CommandError, SweepError, needing, unknown_name
@@ -117,11 +117,12 @@ def sweep(
     _require_count("first_seed", first_seed, least=0)
     runner = engine_of(engine, workers, address)
     target = target_of(what)
-    file = FOLDER / f"{_slug(target.name)}.sqlite" if out is None else Path(out)
+    slug = re.sub(r"[^\w.@+-]+", "_", Path(target.name).name).strip("._") or "sweep"
+    file = FOLDER / f"{slug}.sqlite" if out is None else Path(out)
     if fresh:
         remove_sweep(file)
     seeds, first, start = range(first_seed, first_seed + n), list[Row](), time.monotonic()
-    with SweepFile(file, target.all_about) as rows:
+    with SweepFile(file, {"what": target.name, **target.about, **identity()}) as rows:
         known = {int(row[SEED]): row for row in rows.rows(seeds)}
         left = [seed for seed in seeds if seed not in known]
         are_enough = _are_enough(first, seeds, known, is_enough)
@@ -223,11 +224,6 @@ def _told(seed: int, failure: Failure, rows: SweepFile) -> str:
 def _require_count(name: str, value: object, *, least: int) -> None:
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
         raise CommandError(f"{name} must be a whole number, at least {least}, got {value!r}")
-
-
-def _slug(name: str) -> str:
-    """``name`` as the name of a file."""
-    return re.sub(r"[^\w.@+-]+", "_", Path(name).name).strip("._") or "sweep"
 
 
 EXPORT_SUFFIXES = (".csv", ".parquet")

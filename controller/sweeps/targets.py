@@ -76,11 +76,6 @@ class Target:
         """What workers call."""
         return Job(self.function, own_code())
 
-    @property
-    def all_about(self) -> dict[str, str | bytes]:
-        """All that its rows depend on besides the seed."""
-        return {"what": self.name, **self.about, **identity()}
-
 
 @dataclass(frozen=True, slots=True)
 class Job:

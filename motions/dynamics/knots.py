@@ -159,7 +159,8 @@ def _trunk_path(
     table = np.array([first, *(_over_feet(first, origin, goal.p_feet) for goal in known)])
     if goals[-1].pose is None:
         table[-1] = last
-    clock = _turning_clock(times, stance)[keys]
+    pace = np.where(stance.all(axis=1), STANDING_TURN, 1.0)  # feet in the air let it turn far
+    clock = np.concatenate([[0.0], np.cumsum(pace * np.diff(times))])[keys]
     table[:, 5] = _headings(table[:, 5], [goal.pose for goal in known], clock)
     for begin, end in flights:
         rows = [keys.index(begin), keys.index(end)]
@@ -180,14 +181,6 @@ def _trunk_path(
         slopes[inside] = (table[rows[1]] - table[rows[0]]) / t[-1]
         slopes[inside, 2] += 0.5 * GRAVITY * (t[-1] - 2.0 * t)
     return CubicHermiteSpline(times[keys], table, slopes)(times)
-
-
-def _turning_clock(
-    times: Float[np.ndarray, " n1"], stance: Bool[np.ndarray, "n 4"]
-) -> Float[np.ndarray, " n1"]:
-    """Time [s] in which the trunk may turn far: that with feet in the air, and a little of all."""
-    pace = np.where(stance.all(axis=1), STANDING_TURN, 1.0)
-    return np.concatenate([[0.0], np.cumsum(pace * np.diff(times))])
 
 
 def _headings(

@@ -287,7 +287,9 @@ class FeasibilityChecker:
         case = Case(path, forces, places, model, heavy, world, self._limits, memory)
         carried = case
         if heavy is not model:
-            carried = replace(case, path=_with_load(path, heavy))
+            poses = np.hstack([path.q[:, :3], path.rpy])
+            p_com = centres_of_mass(poses, path.q[:, 7:], heavy)
+            carried = replace(case, path=replace(path, p_com=p_com))
         com, zero_moment_point = dynamics.support(carried)
         if carried is not case:  # the controller feels the load, and shifts the CoM back
             own = dynamics.support(case)[0]
@@ -417,12 +419,6 @@ def _loaded(model: RobotModel, world: World) -> RobotModel:
     )
     heavy.motor, heavy.torque_limits = model.motor, model.torque_limits
     return heavy
-
-
-def _with_load(motion: Trajectory, heavy: RobotModel) -> Trajectory:
-    """The same movement with the CoM that the load gives it."""
-    poses = np.hstack([motion.q[:, :3], motion.rpy])
-    return replace(motion, p_com=centres_of_mass(poses, motion.q[:, 7:], heavy))
 
 
 def _labels(path: Trajectory, spans: Mapping[str, tuple[float, float]]) -> tuple[str, ...]:

@@ -40,7 +40,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from go2_wbc.brief import brief
 from go2_wbc.feasibility_limits import FeasibilityLimits
@@ -362,7 +362,9 @@ def support(case: Case) -> tuple[Series, Series]:
 
     def work(rows: Rows) -> Float[np.ndarray, "k 2"]:
         found = np.full((len(rows), 2), -NO_SUPPORT)
-        for own in _same_support(places[rows]):
+        keys = np.round(places[rows], 6)
+        changes = np.flatnonzero((keys[1:] != keys[:-1]).any(axis=1)) + 1
+        for own in np.split(np.arange(len(keys)), changes):  # where the same feet stand
             stands = motion.stance[rows[own[0]]]
             feet, asked = motion.p_feet[rows[own[0]], stands, :2], both[rows[own]]
             if stands.any():
@@ -393,13 +395,6 @@ def passes_over_few(motion: Trajectory, limits: FeasibilityLimits) -> Bool[np.nd
     first, last = np.append(0, changes + 1), np.append(changes, len(few) - 1)
     lasts = motion.times[last] - motion.times[first]
     return few & np.repeat(lasts <= limits.pair_time, last - first + 1)
-
-
-def _same_support(places: Float[np.ndarray, "n 8"]) -> list[Int[np.ndarray, " k"]]:
-    """Samples, one after the other, in which the same feet stand in the same ``places``."""
-    keys = np.round(places, 6)
-    changes = np.flatnonzero((keys[1:] != keys[:-1]).any(axis=1)) + 1
-    return np.split(np.arange(len(keys)), changes)
 
 
 def state_at(motion: Trajectory, row: int) -> RobotState:

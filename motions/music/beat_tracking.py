@@ -282,14 +282,11 @@ def bars(sound: Sound, times: PerBeat, metre: int | None = None) -> tuple[int, i
     power = np.abs(librosa.stft(sound, n_fft=BAR_WINDOW, hop_length=BAR_HOP)) ** 2
     frames = np.minimum(np.round(times * RATE / BAR_HOP).astype(int), power.shape[1] - 1)
     chroma = librosa.feature.chroma_stft(S=power, sr=RATE, n_fft=BAR_WINDOW)
-    heard = _standard(_bass(power[BASS].sum(axis=0), frames)) + _standard(_changes(chroma, frames))
+    loudness = power[BASS].sum(axis=0)
+    near = [loudness[max(k - 2, 0) : k + STROKE].max() + 1e-6 for k in frames.tolist()]
+    heard = _standard(np.log(near)) + _standard(_changes(chroma, frames))
     places = [(m, first) for m in ([metre] if metre else HEARD) for first in range(m)]
     return max(places, key=lambda place: _evidence(heard, *place))
-
-
-def _bass(loudness: Float[np.ndarray, " n"], frames: Int[np.ndarray, " k"]) -> PerBeat:
-    """How loud [log of power] the bass is about each beat."""
-    return np.log([loudness[max(k - 2, 0) : k + STROKE].max() + 1e-6 for k in frames.tolist()])
 
 
 def _changes(chroma: Float[np.ndarray, "12 n"], frames: Int[np.ndarray, " k"]) -> PerBeat:

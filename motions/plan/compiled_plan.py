@@ -88,11 +88,8 @@ class DynamicSpan:
             ),
         )
 
-    def forces_at(self, t: float) -> Float[np.ndarray, "4 3"]:
-        """Forces [N] on the feet that it was solved with, at ``t`` [s] of the plan."""
-        return self.trajectory.forces[self._step_at(t)]
-
-    def _step_at(self, t: float) -> int:
+    def step_at(self, t: float) -> int:
+        """Row of the trajectory's forces and torques that belongs to ``t`` [s] of the plan."""
         plan = self.trajectory
         row = int(np.searchsorted(plan.times, t - self.start, side="right")) - 1
         return min(max(row, 0), len(plan.tau) - 1)
@@ -102,7 +99,7 @@ class DynamicSpan:
 
         The planned state is that of the curves that are played, for which see ``centred``.
         """
-        plan, row = self.trajectory, self._step_at(t)
+        plan, row = self.trajectory, self.step_at(t)
         if not 1 <= plan.stance[row].sum() <= BALANCING_FEET:
             return None
         step = float(plan.times[row + 1] - plan.times[row])
@@ -347,7 +344,8 @@ class CompiledPlan(MotionPlan):
         """Its numbers, by a kernel; see ``MotionPlan.row_at``."""
         target, span = self._asked.at(t), self._span_at(t)
         if span is not None:
-            target.f_world_feet[:], target.force_weight = span.forces_at(t), FORCE_WEIGHT
+            target.f_world_feet[:] = span.trajectory.forces[span.step_at(t)]
+            target.force_weight = FORCE_WEIGHT
         return target.row
 
     def feedback_at(self, t: float) -> PlanFeedback | None:

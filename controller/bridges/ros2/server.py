@@ -21,7 +21,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -39,7 +39,7 @@ from controller.bridges.ros2.states import StatePublisher
 from controller.bridges.ros2.velocity import VelocityInput
 from controller.bridges.saved_motions import SavedMotions
 from controller.go2_controller import GO2Controller
-from controller.jobs import Job, JobServer, Reply
+from controller.jobs import JobServer, Reply
 from controller.modes import Outcome
 from controller.pacing import SWITCH_INTERVAL, LogThrottle, Pacer
 from go2_wbc.config import Config
@@ -93,13 +93,14 @@ class MotionActions:
             if handle.is_cancel_requested:  # again and again: one that came early gets lost
                 self._jobs.cancel()
             if (job := self._jobs.job) is not None:
-                handle.publish_feedback(self._feedback(job))
+                handle.publish_feedback(
+                    ros.PlayMotion.Feedback(
+                        phase=job.phase,
+                        progress=float(go2.progress),
+                        elapsed=float(go2.state.time - job.start),
+                    )
+                )
         return self._conclude(handle, answered.result())
-
-    def _feedback(self, job: Job) -> Any:
-        go2 = self._jobs.robot
-        progress, elapsed = float(go2.progress), float(go2.state.time - job.start)
-        return ros.PlayMotion.Feedback(phase=job.phase, progress=progress, elapsed=elapsed)
 
     def _conclude(self, handle: Any, answer: Outcome) -> Any:
         if answer.ok:
@@ -230,7 +231,12 @@ class RobotNode:
                 ros2.BEHAVIOR_SERVICE,
                 lambda request, reply: self._order(request.command, reply),
             )
-        self._triggers = cycle(self._offer_triggers())
+        acts: dict[str, Callable[[Any, Reply], None]] = {
+            name: lambda _request, reply, name=name: self._order(name, reply) for name in COMMANDS
+        }
+        acts[ros2.STATISTICS_SERVICE] = self._tell_statistics
+        polls = [polled_service(node, ros.Trigger, name, act) for name, act in acts.items()]
+        self._triggers = cycle(polls)
         self._states = StatePublisher(
             node, simulator, realtime=settings.realtime, sensors=settings.sensors
         )
@@ -240,11 +246,6 @@ class RobotNode:
         self._pacer = Pacer(simulator.control_period, LATE) if settings.realtime else None
         self._throttle, self._errors = LogThrottle(_log), 0
         self._cpu, self._began = 0.0, time.monotonic()
-
-    def _offer_triggers(self) -> Iterator[Poll]:
-        acts = {name: partial(self._take_trigger, name) for name in COMMANDS}
-        for name, act in {**acts, ros2.STATISTICS_SERVICE: self._tell_statistics}.items():
-            yield polled_service(self._node, ros.Trigger, name, act)
 
     @property
     def offer(self) -> str:
@@ -305,9 +306,6 @@ class RobotNode:
     def _take_pose(self, pose: Any) -> None:
         at = pose.orientation
         self._velocity.accept_pose(pose.position.z, (at.x, at.y, at.z, at.w))
-
-    def _take_trigger(self, name: str, _request: Any, reply: Reply) -> None:
-        self._order(name, reply)
 
     def _order(self, command: str, reply: Reply) -> None:
         order(self._jobs, command, reply)

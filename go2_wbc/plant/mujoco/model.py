@@ -383,7 +383,9 @@ def drawn_shapes(mjcf: Path | str) -> tuple[dict[str, MeshPart], list[DrawnShape
     meshes: dict[str, MeshPart] = {}
     shapes = []
     for geom in range(model.ngeom):
-        body, rgba = model.geom_bodyid[geom], _rgba(model, geom)
+        body, material = model.geom_bodyid[geom], model.geom_matid[geom]
+        color = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
+        rgba = tuple(color.tolist())
         if model.body_rootid[body] != base or model.geom_group[geom] > VISUAL_GROUP or not rgba[3]:
             continue
         link = model.body(body).name
@@ -405,11 +407,6 @@ def _pose(place: Float[np.ndarray, "3"], turn: Float[np.ndarray, "9"]) -> Float[
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = turn.reshape(3, 3), place
     return T
-
-
-def _rgba(model: mujoco.MjModel, geom: int) -> tuple[float, ...]:
-    material = model.geom_matid[geom]
-    return tuple((model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]).tolist())
 
 
 def _shape(
