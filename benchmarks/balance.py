@@ -42,6 +42,7 @@ TROT_PUSHES = {"lateral": (math.pi / 2, 26.0), "forward": (0.0, 50.0), "backward
 """Direction [rad] and impulse [N s]."""
 TROT_SPEED, SPEED_TOLERANCE, TROT_TIME = 0.5, 0.15, 2.0
 """m/s, m/s, and the time [s] after a push within which it trots again."""
+STRIDE = GAITS["trot"].period  # [s]
 DROP_FRICTION = (0.4, 1.0)
 DROP_HEIGHT = (0.1, 0.5)  #: Height [m] of the lowest point of the robot over the floor
 DROP_TIME = 1.0  #: Time [s] for which the limp robot falls before ``recover()``
@@ -95,17 +96,23 @@ def share_of_phases(
 
 def trots_on(robot: TrialRobot, phase: int, force: np.ndarray) -> bool:
     """Whether a robot that is pushed by ``force`` [N] at a ``phase`` of its trot trots on."""
-    period = GAITS["trot"].period
     set_off(robot, "trot", VelocityCommand(TROT_SPEED))
+    if not stays_up(robot, phase, force):
+        return False
+    strides = robot.truth.recording(since=robot.plant.time - 2.0 * STRIDE)
+    speed = float(strides.com_velocity[:, 0].mean())
+    return abs(speed - TROT_SPEED) < SPEED_TOLERANCE
+
+
+def stays_up(robot: TrialRobot, phase: int, force: np.ndarray) -> bool:
+    """Whether a robot that trots stays up under a push by ``force`` [N] at a ``phase``."""
     try:
-        robot.wait(TROT_TIME + phase * period / PHASES)
+        robot.wait(TROT_TIME + phase * STRIDE / PHASES)
         robot.push(force, PUSH_TIME)
         robot.wait(TROT_TIME)
     except TrialFailed:
         return False
-    strides = robot.truth.recording(since=robot.plant.time - 2.0 * period)
-    speed = float(strides.com_velocity[:, 0].mean())
-    return abs(speed - TROT_SPEED) < SPEED_TOLERANCE
+    return True
 
 
 def dropped(seed: int, sensors: str = "ideal") -> MujocoPlant:
@@ -163,7 +170,6 @@ def _follow(trial: Trial, found: TrialResult, course: Course, count: int) -> flo
     """Note the share of a course's ``count`` parts that are done; gives how often the QP failed."""
     rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
     with TrialRobot(plant_of(trial, FIRST_SEED, UNTOLD)) as robot:
-        robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         try:
             for seconds in course(robot, rng, count):

@@ -86,7 +86,6 @@ def holds(gait: str, axis: str, speed: float, seed: int) -> bool:
     rate = CONFIG.locomotion.angular_acceleration if turn else CONFIG.locomotion.linear_acceleration
     try:
         with TrialRobot(plant_of(Trial(seed), FIRST_SEED, UNTOLD), CONFIG) as robot:
-            robot.require(robot.go2.stand())
             robot.require(robot.go2.walk(unbounded))
             robot.go2.move(float(x), float(turn), linear_y=float(y))
             robot.wait(speed / rate + LEAD)

@@ -158,7 +158,6 @@ def measure_walk(trial: Trial, found: TrialResult, what: Break) -> None:
             at = float(rng.uniform(0.0, WALK_TIME))
             plant.fault(what.kind, part=part, at=at if what.at_once else 0.0, value=what.value)
         try:
-            robot.require(go2.stand())
             robot.require(go2.walk())
             go2.move(SPEED)
             robot.wait(1.0)

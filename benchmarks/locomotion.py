@@ -214,7 +214,6 @@ def measure_estimate(trial: Trial, found: TrialResult, terrain: Terrain | None, 
     )
     off: list[Float[np.ndarray, "3"]] = []
     with TrialRobot(plant) as robot:
-        robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         before = _pose_off(plant)
         robot.truth.on_tick = lambda: off.append(plant.read().v[:3] - plant.truth().v[:3])

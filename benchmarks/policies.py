@@ -14,15 +14,14 @@ from functools import cache, partial
 
 import numpy as np
 
-from benchmarks.balance import PHASES, TROT_PUSHES, share_of_phases
+from benchmarks.balance import STRIDE, TROT_PUSHES, share_of_phases, stays_up
 from benchmarks.command import Benchmark
 from benchmarks.locomotion import FIRST_SEED, START_TIME, WINDOW, Run, measured
-from benchmarks.robots import PUSH_TIME, UNTOLD, plant_of
+from benchmarks.robots import UNTOLD, plant_of
 from benchmarks.study import Study, TrialResult
 from controller.policies import TROT, Policy, probe
 from controller.policies.probing import Change, changes, scaled
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
-from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant import MujocoPlant
 
@@ -31,7 +30,6 @@ SPEEDS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)  # m/s
 SPEED, SLIPPERY = 0.5, 0.3  # m/s, friction
 ON_ICE = f"{SPEED:g} m/s on {SLIPPERY:g}, 20 s"
 HAND_OVERS = 20
-STRIDE = GAITS["trot"].period
 KINDS = ("order", "signs", "scale", "gain")
 CLOSE = 1.5  #: Factor by which a number that is put right may still be off
 
@@ -44,7 +42,6 @@ def cloned() -> Policy:
 
 def set_off(robot: TrialRobot, walk: str, speed: float) -> None:
     """Stand up and walk ahead; the record begins with the command."""
-    robot.require(robot.go2.stand())
     robot.require(robot.go2.walk(policy=cloned() if walk == "policy" else None))
     robot.go2.move(speed)
     robot.truth.clear()
@@ -73,14 +70,7 @@ def measure_pushes(trial: Trial, found: TrialResult, walk: str, push: str) -> No
 
     def goes_on(robot: TrialRobot, phase: int, force: np.ndarray) -> bool:
         set_off(robot, walk, SPEED)
-        try:
-            robot.wait(2.0 + phase * STRIDE / PHASES)
-            robot.push(force, PUSH_TIME)
-            robot.wait(2.0)
-        except TrialFailed as failed:
-            found.notes[""] = str(failed)
-            return False
-        return True
+        return stays_up(robot, phase, force)
 
     found.values[""] = share_of_phases(trial, FIRST_SEED, push, goes_on)
 

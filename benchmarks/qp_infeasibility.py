@@ -81,7 +81,6 @@ def watch(robot: TrialRobot, course: Iterator[float], found: TrialResult) -> Non
     a fall counts for the controller or in truth, within a second of giving up.
     """
     go2 = robot.go2
-    robot.require(go2.stand())
     robot.require(go2.walk())
     robot.truth.clear()
     counts, start = go2.telemetry, robot.plant.time

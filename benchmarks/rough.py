@@ -143,7 +143,6 @@ def measure_way(trial: Trial, found: TrialResult, way: Way, first_seed: int = FI
     behind = (way.terrain(seed).end + BEYOND) / abs(math.cos(way.heading))
     length = way.length or behind
     with TrialRobot(way.plant(seed, trial.sensors)) as robot:
-        robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         robot.truth.clear()
         try:
@@ -250,7 +249,6 @@ def measure_reversals(
     settings = {**drawn, "sensors": trial.sensors, "seed": seed}
     plant = UnreliablePlant(settings, latest=case.latest, lost=case.lost)
     with TrialRobot(plant) as robot:
-        robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         for ahead, left, turn in COMMANDS * ROUNDS:
             robot.truth.clear()

@@ -214,7 +214,6 @@ def set_off(robot: TrialRobot, gait: str, command: VelocityCommand) -> None:
     Raises:
         TrialFailed: if the robot does not get that far.
     """
-    robot.require(robot.go2.stand())
     robot.require(robot.go2.walk(gait))
     robot.go2.move(command.linear_x, command.angular_z, linear_y=command.linear_y)
     robot.truth.clear()
