@@ -94,7 +94,6 @@ def static(n: Numbers) -> Timeline:
 
 
 def _leap(n: Numbers, line: Timeline) -> Timeline:
-    """One solved part."""
     kind, height = n.one_of(("jump", "hop", "rear", "lift", "pounce")), n.between(0.05, 0.12)
     far, turn, hold = n.far(0.3), deg(n.far(70.0)), n.between(0.25, 0.7)
     if kind == "jump":

@@ -211,7 +211,6 @@ def measure_barrier(
 
 
 def _barrier(way: Way) -> Study:
-    """Its rows and its trial."""
     rows = (
         ("done", "share that stops, says so and touches nothing", ">= 1"),
         ("left", "way left", ">= m"),

@@ -30,8 +30,6 @@ BodyTask = PositionTask | placo.DynamicsOrientationTask
 
 @dataclass(frozen=True, slots=True)
 class _Solver:
-    """PlaCo's solver with the tasks of one contact mode."""
-
     qp: placo.DynamicsSolver
     position: PositionTask
     orientation: placo.DynamicsOrientationTask

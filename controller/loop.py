@@ -240,7 +240,6 @@ class ControlLoop:
             self._feet.update(self._held, self.state, self.plant.control_period)
 
     def _payload_of(self, behaviour: Behaviour) -> Payload:
-        """What ``behaviour`` is to know of what the robot carries."""
         return self.telemetry.payload if behaviour.knows_payload else NO_PAYLOAD
 
     def _feel(self) -> None:

@@ -199,7 +199,6 @@ class Telemetry:
         return {"multipliers": strongest[:, _MULTIPLIERS], "gave_way": gave_way}
 
     def _taken(self, rows: Int[np.ndarray, " n"], columns: slice) -> Float[np.ndarray, "n k"]:
-        """A copy of some columns of these rows."""
         blocks, places = np.divmod(rows, BLOCK)
         taken = np.empty((len(rows), _TICK.size))[:, columns]
         for block in np.unique(blocks):

@@ -42,7 +42,6 @@ class Walker:
 
     @property
     def _policy(self) -> Policy | None:
-        """What walks when there is a command, if it is learned."""
         learned = self.walking.learned
         return learned.policy if learned is not None and learned.is_wanted else None
 

@@ -169,7 +169,6 @@ def _is_collection(value: object, origin: type, parts: tuple[Any, ...]) -> bool:
 
 
 def _is_array(value: object, kind: Any) -> bool:  # noqa: ANN401
-    """Whether ``value`` can be an array of this kind and shape."""
     try:
         array = np.asarray(value)
     except ValueError:  # of lists of several lengths

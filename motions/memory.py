@@ -26,8 +26,6 @@ Kept = TypeVar("Kept")
 
 
 class _Kind:
-    """Results of one kind."""
-
     def __init__(self) -> None:
         self.count, self.values = 0, np.empty((0, 0))
         self._keys, self._places = np.empty(0, np.uint64), np.empty(0, int)  # by keys

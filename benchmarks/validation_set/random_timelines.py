@@ -139,7 +139,6 @@ def _raised(draw: _Draw, a: float, pace: float) -> Timeline:
 
 
 def _quick(draw: _Draw, a: float, pace: float) -> Timeline:
-    """Taps and stamps."""
     leg, line, z = draw.one_of(_NAMES), Timeline(), a * draw.between(0.02, 0.08)
     up, down = draw.between(0.15, 0.4) / pace, draw.between(0.12, 0.35) / pace
     for _ in range(draw.count(1, 4)):

@@ -95,7 +95,6 @@ class Learned:
             return reference
 
     def _landed(self, state: RobotState) -> Bool[np.ndarray, "4"]:
-        """Feet that have just come down."""
         contact, since = state.feet_in_contact, self._in_air_since
         landed = contact & (state.time - since > SWING)
         self._in_air_since = np.where(contact, np.inf, np.minimum(since, state.time))

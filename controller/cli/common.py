@@ -148,7 +148,6 @@ def _taken(kind: object, parameter: inspect.Parameter) -> dict[str, Any]:
 
 
 def _called(call: Callable[..., T], given: argparse.Namespace) -> T:
-    """What ``call`` gives for its options."""
     values: dict[str, Any] = {}
     for parameter, kind, _ in _parameters(call):
         value = _called(kind, given) if _is_part(kind) else getattr(given, parameter.name)

@@ -70,7 +70,6 @@ def run(
 def _played(
     dance: Dance, checked: CheckedMotion, checker: FeasibilityChecker, line: ProgressLine
 ) -> tuple[Any, dict[str, Any]]:
-    """What to show of the run, and what was measured."""
     from controller.motion_measurement import during_motion, measure_motion
     from controller.report_view import performed
     from go2_wbc.plant import MujocoPlant
@@ -126,7 +125,6 @@ def _accents(dance: Dance, heard: DancedAccents) -> dict[str, Any]:
 
 
 def _told(song: Path, found: Beats, dance: Dance) -> dict[str, Any]:
-    """What was heard and composed."""
     return {
         "song": str(song),
         "tempo": round(found.tempo, 2),

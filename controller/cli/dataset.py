@@ -81,7 +81,6 @@ def _pair(name: str, values: tuple[float, ...]) -> tuple[float, float]:
 
 
 def _told(found: Dataset) -> dict[str, Any]:
-    """What a data set holds, in numbers."""
     falls = {int(seed) for seed in found["seed"][found["fell"]]}
     return {
         "rows": len(found),

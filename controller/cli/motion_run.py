@@ -151,7 +151,6 @@ def run(
 def _write(
     files: Files, recording: Recording, checked: CheckedMotion, model: RobotModel, *, is_quiet: bool
 ) -> None:
-    """Write what was asked for, and say where it is."""
     from controller.report_view import performed
 
     told: list[tuple[str, Path]] = []

@@ -179,7 +179,6 @@ def _expert(task: Playable, gait: str, ranges: Mapping[str, Range]) -> tuple[Exp
 
 
 def _commands(own: Commands, ranges: Mapping[str, Range]) -> Commands:
-    """The task's commands with other ranges."""
     for name, given in ranges.items():
         if name not in ("linear_x", "linear_y", "angular_z"):
             raise CommandError(f"commands are linear_x, linear_y and angular_z, got {name!r}")

@@ -237,7 +237,6 @@ class Go2VectorEnv(gymnasium.vector.VectorEnv[Rows, np.ndarray, np.ndarray]):
         return [*map(self._answered, range(len(answers)), answers), given]
 
     def _answered(self, number: int, answer: bytes | None) -> Any:  # noqa: ANN401
-        """What a worker has answered."""
         if answer is None:
             part, how = self._shares[number].tolist(), self._workers.pop(number).end()
             self._end()

@@ -261,7 +261,6 @@ class LocalEngine(Engine):
 
 
 def _give(worker: Worker, trials: Trials[Any], busy: dict[Worker, int]) -> None:
-    """Have a worker do what waits, or end it."""
     if not trials.waiting:
         worker.end()
         return

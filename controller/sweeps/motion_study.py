@@ -89,7 +89,6 @@ _NOTHING = MotionMeasurement(
 
 
 def _told(world: World) -> Row:
-    """What the seed has drawn."""
     names = ("friction", "mass_scale", "joint_friction")
     return {name: getattr(world, name) for name in names}
 

@@ -84,7 +84,6 @@ class RayEngine(engine.Engine):
 
     @contextmanager
     def _connected(self) -> Iterator[Any]:
-        """Ray, connected to the cluster; afterwards not."""
         ray = _ray(QUIET)
         started = {"num_cpus": self._workers or engine.processors(), "include_dashboard": False}
         try:

@@ -255,7 +255,6 @@ class SweepFile:
             return self._base.execute(statement, values).fetchall()
 
     def _header(self, name: str) -> int:
-        """A number in the header of the file."""
         return self._all(f"PRAGMA {name}")[0][0]
 
     @contextmanager
@@ -294,7 +293,6 @@ def _differences(found: About, now: About) -> list[str]:
 
 
 def _quoted(name: str) -> str:
-    """``name`` as SQL's identifier."""
     return '"' + name.replace('"', '""') + '"'
 
 

@@ -270,8 +270,6 @@ def _strip(begin: Sequence[float], end: Sequence[float]) -> Block:
 
 
 class _Pit(Terrain):
-    """A pit across the way."""
-
     __slots__ = ()
     depth: float
     start: float

@@ -209,7 +209,6 @@ def _numbers(model: RobotModel) -> Iterator[np.ndarray]:
 
 @cache
 def _versions() -> tuple[str, ...]:
-    """Of the packages, and of this one by its sources."""
     digest = hashlib.sha256()
     for source in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(source.read_bytes())

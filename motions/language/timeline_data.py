@@ -179,7 +179,6 @@ class TimelineData:
         _require_no_overlap(self.keys)
 
     def _require_length(self, end: float) -> None:
-        """Raise TimelineError if it would be longer than ``longest``."""
         if end > positive("longest", self.longest):
             raise TimelineError(
                 f"a motion of {end:g} s is longer than {self.longest:g} s: "

@@ -190,8 +190,6 @@ CHORDS = ((0, 5, 7, 0), (0, 9, 5, 7), (0, 7, 9, 5), (9, 5, 0, 7), (2, 7, 0, 0))
 
 @dataclass(frozen=True, slots=True)
 class _Player:
-    """Plays notes at the places of a score into ``sound``."""
-
     sound: Sound
     beats: Float[np.ndarray, " k"]
     rng: np.random.Generator

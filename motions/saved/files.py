@@ -254,7 +254,6 @@ def _arrays_of(file: Path) -> dict[str, np.ndarray]:
 
 
 def _require_plan(plan: CompiledPlan) -> None:
-    """Raise MotionFileError for numbers that fit no plan."""
     curves, contacts = plan.curves, plan.contacts
     if contacts.period is not None:
         raise MotionFileError(f"plan.contacts must not repeat, got a period of {contacts.period}")

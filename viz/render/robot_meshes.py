@@ -115,7 +115,6 @@ def _slender(visuals: RobotVisuals) -> RobotVisuals:
 
 
 def _solid(item: pin.GeometryObject) -> MeshPart | None:
-    """A shape that a URDF describes without a mesh."""
     shape, kind = item.geometry, type(item.geometry).__name__.lower()
     round_size = [getattr(shape, name, 0.0) for name in ("radius", "halfLength")]
     size = shape.halfSide if kind == "box" else np.array([*round_size, 0.0])

@@ -45,7 +45,6 @@ class SnapshotCamera:
 
 
 def _surface(block: Block) -> Surface:
-    """The six sides of a block."""
     box = trimesh.creation.box(extents=2.0 * np.array(block.half_size))
     sides = smooth_surface(np.array(box.vertices), np.array(box.faces), _COLOR, crease=_CREASE)
     turn = pin.rpy.rpyToMatrix(0.0, block.pitch, block.yaw)
