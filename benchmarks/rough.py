@@ -190,15 +190,13 @@ def _measured(recorded: TruthRecording) -> dict[str, float]:
     return values | {"ripple": float(np.sqrt(np.mean(change**2))) if len(change) else 0.0}
 
 
-def measure_barrier(
-    trial: Trial, found: TrialResult, way: Way, first_seed: int = FIRST_SEED
-) -> None:
+def measure_barrier(trial: Trial, found: TrialResult, way: Way) -> None:
     """Ask the robot to walk into what it cannot walk over: it stops, says so, and touches nothing.
 
     Raises:
         TrialFailed: if it does not.
     """
-    with TrialRobot(way.plant(first_seed + trial.seed, trial.sensors)) as robot:
+    with TrialRobot(way.plant(FIRST_SEED + trial.seed, trial.sensors)) as robot:
         robot.require(robot.go2.stand())
         robot.truth.clear()
         arrived = robot.go2.move_forward(3.0)

@@ -106,16 +106,13 @@ def read_motion(path: Path | str) -> Timeline:
 def _text(line: Timeline) -> str:
     """JSON with a line for each field and each key."""
     names = [field.name for field in fields(line) if field.init and field.name != _KEYS]
-    rest = {name: Encoder().encoded(getattr(line, name), name) for name in names}
+    rest = MOTION_FORMAT.header()
+    rest |= {name: Encoder().encoded(getattr(line, name), name) for name in names}
     rows = [json.dumps(_fields(key, f"{_KEYS}[{i}]")) for i, key in enumerate(line.keys)]
     lines = [f"  {json.dumps(name)}: {json.dumps(value)}," for name, value in rest.items()]
-    header = [
-        f"  {json.dumps(name)}: {json.dumps(value)},"
-        for name, value in MOTION_FORMAT.header().items()
-    ]
     listed = ",\n".join(f"    {row}" for row in rows)
     listed = f"\n{listed}\n  " if rows else ""
-    return "\n".join(["{", *header, *lines, f'  "{_KEYS}": [{listed}]', "}", ""])
+    return "\n".join(["{", *lines, f'  "{_KEYS}": [{listed}]', "}", ""])
 
 
 def _fields(key: Key, where: str) -> dict[str, Any]:

@@ -306,7 +306,9 @@ def content_of(path: Path | str) -> bytes:
     """
     file = Path(path)
     if not file.is_file():
-        raise MotionFileError(f"there is no file {file}" if not file.is_dir() else _folder(file))
+        is_folder = file.is_dir()
+        why = f"{file} is a folder, not a file" if is_folder else f"there is no file {file}"
+        raise MotionFileError(why)
     try:
         if file.stat().st_size > LARGEST_FILE:
             raise MotionFileError(f"{file} is larger than {LARGEST_FILE / 1e6:g} MB: no motion is")
@@ -330,7 +332,3 @@ def fields_of(text: bytes, path: Path | str) -> object:
 
 def _refuse(word: str) -> float:
     raise ValueError(f"{word} is no finite number")
-
-
-def _folder(path: Path) -> str:
-    return f"{path} is a folder, not a file"
