@@ -34,13 +34,9 @@ def read_saved(file: Path) -> Timeline | CompiledPlan:
 @final
 @dataclass(frozen=True, slots=True)
 class SavedMotions:
-    """Those of one folder.
+    """Those of one folder."""
 
-    Attributes:
-        folder: that they lie in, not below it; None for none.
-    """
-
-    folder: Path | None = None
+    folder: Path | None = None  #: that they lie in, not below it; None for none
 
     def __post_init__(self) -> None:
         """Raise CommandError for what is no folder."""

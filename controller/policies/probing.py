@@ -64,17 +64,11 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What the probe makes of a sidecar.
+    """What the probe makes of a sidecar."""
 
-    Attributes:
-        mark: of the run as the sidecar says; smaller is better.
-        best: of the run that was best.
-        change: what is then changed; None if nothing is found to be wrong.
-    """
-
-    mark: float
-    best: float
-    change: Change | None
+    mark: float  #: of the run as the sidecar says; smaller is better
+    best: float  #: of the run that was best
+    change: Change | None  #: what is then changed; None if nothing is found to be wrong
 
     __repr__ = brief
 

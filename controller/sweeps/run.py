@@ -47,23 +47,14 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class SweepResult:
-    """The rows of a sweep.
+    """The rows of a sweep."""
 
-    Attributes:
-        path: of the file that keeps them.
-        name: of what was swept.
-        columns: names and kinds of the values.
-        rows: in the order of their seeds, which are the first value of each.
-        failures: why seeds gave no row.
-        about: what the rows depend on, by name: versions, digests.
-    """
-
-    path: Path
-    name: str
-    columns: Columns
-    rows: list[Row]
-    failures: dict[int, str]
-    about: dict[str, str]
+    path: Path  #: of the file that keeps them
+    name: str  #: of what was swept
+    columns: Columns  #: names and kinds of the values
+    rows: list[Row]  #: in the order of their seeds, which are the first value of each
+    failures: dict[int, str]  #: why seeds gave no row
+    about: dict[str, str]  #: what the rows depend on, by name: versions, digests
 
     _repr_html_ = inline_html
     __repr__ = brief

@@ -12,17 +12,11 @@ from go2_wbc.robot.state import JointCommand, PartFault, RobotState
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """What a range sensor has met around the robot; what it sees of the robot itself is left out.
+    """What a range sensor has met around the robot, without what it sees of the robot itself."""
 
-    Attributes:
-        time: plant time [s] at which it was taken.
-        p_base_points: where its rays have met something, in the base frame [m].
-        deviation: standard deviation of a point's height [m].
-    """
-
-    time: float
-    p_base_points: ArrayNx3
-    deviation: float
+    time: float  #: plant time [s] at which it was taken
+    p_base_points: ArrayNx3  #: where its rays have met something, in the base frame [m]
+    deviation: float  #: standard deviation of a point's height [m]
 
 
 class Plant(ABC):

@@ -25,17 +25,12 @@ for unknown."""
 
 @dataclass(frozen=True, slots=True)
 class ImuSample:
-    """One reading of the inertial measurement unit, in the IMU's frame (axes as the base's).
+    """One reading of the inertial measurement unit, in the IMU's frame (axes as the base's)."""
 
-    Attributes:
-        quaternion: orientation of the IMU in the world, x y z w.
-        gyro: angular velocity [rad/s].
-        accelerometer: specific force [m/s^2]; a robot at rest reads +9.81 upwards.
-    """
-
-    quaternion: Float[np.ndarray, "4"]
-    gyro: Float[np.ndarray, "3"]
+    quaternion: Float[np.ndarray, "4"]  #: orientation of the IMU in the world, x y z w
+    gyro: Float[np.ndarray, "3"]  #: angular velocity [rad/s]
     accelerometer: Float[np.ndarray, "3"]
+    """Specific force [m/s^2]; a robot at rest reads +9.81 upwards."""
 
     __repr__ = brief
 

@@ -33,22 +33,15 @@ class Boxes(Terrain):
     """Flat ground strewn with low boxes that the robot does not know about.
 
     The robot starts at the origin, which stays clear.
-
-    Attributes:
-        height: largest height of a box [m]; heights are uniform in (0, height].
-        size: side of a box [m].
-        count: number of boxes.
-        extent: half side of the square they are strewn over [m].
-        clear_radius: no box reaches closer than this to the origin [m]; the Go2 is 0.7 m long.
-        seed: of the random places and heights.
     """
 
-    height: float = 0.06
-    size: float = 0.25
-    count: int = 100
-    extent: float = 4.0
+    height: float = 0.06  #: largest height of a box [m]; heights are uniform in (0, height]
+    size: float = 0.25  #: side of a box [m]
+    count: int = 100  #: number of boxes
+    extent: float = 4.0  #: half side of the square they are strewn over [m]
     clear_radius: float = 0.55
-    seed: int = 0
+    """No box reaches closer than this to the origin [m]; the Go2 is 0.7 m long."""
+    seed: int = 0  #: of the random places and heights
 
     def layout(self) -> Float[np.ndarray, "n 4"]:
         """One row per box: x, y of its centre [m], yaw [rad], height [m].
@@ -79,25 +72,15 @@ TREAD = 0.04  #: Thickness [m] of a step with an open riser
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE)
 class Stairs(Terrain):
-    """Steps that lead up to a platform; with a ``count`` of 1 a single step.
+    """Steps that lead up to a platform; with a ``count`` of 1 a single step."""
 
-    Attributes:
-        height: of a step [m].
-        count: of the steps, of each flight.
-        depth: of a step [m]; 0.3 is that of a flight of stairs in a house.
-        start: distance of the first one from the origin [m].
-        way: "up", "down" from the ground at the start, or "both", up and down again.
-        landing: length of the level ground behind the last step up [m].
-        is_open: whether there are treads only, with nothing below them.
-    """
-
-    height: float = 0.08
-    count: int = 4
-    depth: float = 0.3
-    start: float = 0.8
-    way: str = UP
-    landing: float = PLATFORM
-    is_open: bool = False
+    height: float = 0.08  #: of a step [m]
+    count: int = 4  #: of the steps, of each flight
+    depth: float = 0.3  #: of a step [m]; 0.3 is that of a flight of stairs in a house
+    start: float = 0.8  #: distance of the first one from the origin [m]
+    way: str = UP  #: "up", "down" from the ground at the start, or "both", up and down again
+    landing: float = PLATFORM  #: length of the level ground behind the last step up [m]
+    is_open: bool = False  #: whether there are treads only, with nothing below them
 
     def __post_init__(self) -> None:
         """Raise ConfigError for another way."""
@@ -168,13 +151,9 @@ class Blocks(Terrain):
 @dataclass(frozen=True, slots=True)
 @ranged(angle=CLIMBED)
 class Slope(Terrain):
-    """A plane that rises ahead; where the robot goes on it is for ``initial_yaw`` to say.
+    """A plane that rises ahead; where the robot goes on it is for ``initial_yaw`` to say."""
 
-    Attributes:
-        angle: of the plane [rad].
-    """
-
-    angle: float
+    angle: float  #: of the plane [rad]
 
     @property
     def floor_pitch(self) -> float:
@@ -189,17 +168,11 @@ class Slope(Terrain):
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE, angle=CLIMBED)
 class Ramp(Terrain):
-    """A slope that leads up from the level, a level top, and a slope that leads down again.
+    """A slope that leads up from the level, a level top, and a slope that leads down again."""
 
-    Attributes:
-        angle: of both slopes [rad].
-        length: of each slope and of the top, on the level [m].
-        start: distance of the first slope from the origin [m].
-    """
-
-    angle: float
-    length: float = 1.5
-    start: float = 0.8
+    angle: float  #: of both slopes [rad]
+    length: float = 1.5  #: of each slope and of the top, on the level [m]
+    start: float = 0.8  #: distance of the first slope from the origin [m]
 
     @property
     def end(self) -> float:
@@ -234,18 +207,12 @@ class Waves(Terrain):
     """Waves across the way, from valley to valley.
 
     They are made of flat strips: on MuJoCo's height fields feet are pinned between two prisms.
-
-    Attributes:
-        height: of a crest over a valley [m].
-        length: of a wave [m].
-        count: of them.
-        start: distance of the first one from the origin [m].
     """
 
-    height: float = 0.08
-    length: float = 1.0
-    count: int = 5
-    start: float = 0.8
+    height: float = 0.08  #: of a crest over a valley [m]
+    length: float = 1.0  #: of a wave [m]
+    count: int = 5  #: of them
+    start: float = 0.8  #: distance of the first one from the origin [m]
 
     @property
     def end(self) -> float:
@@ -289,24 +256,15 @@ class _Pit(Terrain):
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE, uneven=NOT_NEGATIVE, seed=NOT_NEGATIVE)
 class Stones(_Pit):
-    """Square stepping stones in a pit.
+    """Square stepping stones in a pit."""
 
-    Attributes:
-        size: side of a stone [m].
-        gap: between two of them, ahead and aside [m].
-        count: of rows of stones, ahead.
-        depth: of the pit [m].
-        uneven: by which a stone may be lower [m]; each is drawn evenly, by the ``seed``.
-        start: where the pit begins, from the origin [m].
-    """
-
-    size: float = 0.25
-    gap: float = 0.1
-    count: int = 6
-    depth: float = 0.4
-    uneven: float = 0.0
+    size: float = 0.25  #: side of a stone [m]
+    gap: float = 0.1  #: between two of them, ahead and aside [m]
+    count: int = 6  #: of rows of stones, ahead
+    depth: float = 0.4  #: of the pit [m]
+    uneven: float = 0.0  #: by which a stone may be lower [m]; each is drawn evenly, by the ``seed``
     seed: int = 0
-    start: float = 0.8
+    start: float = 0.8  #: where the pit begins, from the origin [m]
 
     @property
     def end(self) -> float:
@@ -353,13 +311,10 @@ class Gap(_Pit):
 @typed()
 @dataclass(frozen=True, slots=True)
 class Course(Terrain):
-    """Several terrains, one behind the other.
-
-    Attributes:
-        parts: each with its own start, from the end of the one before; each must have an end.
-    """
+    """Several terrains, one behind the other."""
 
     parts: tuple[Terrain, ...]
+    """Each with its own start, from the end of the one before; each must have an end."""
 
     __repr__ = brief
 
@@ -422,17 +377,11 @@ class Course(Terrain):
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE)
 class Patch(Terrain):
-    """A strip across the way with a friction of its own, as of oil or ice; 2 mm high.
+    """A strip across the way with a friction of its own, as of oil or ice; 2 mm high."""
 
-    Attributes:
-        friction: sliding friction coefficient on it.
-        length: [m].
-        start: distance from the origin [m].
-    """
-
-    friction: float = 0.15
-    length: float = 0.5
-    start: float = 1.0
+    friction: float = 0.15  #: sliding friction coefficient on it
+    length: float = 0.5  #: [m]
+    start: float = 1.0  #: distance from the origin [m]
 
     def blocks(self) -> tuple[Block, ...]:
         """The strip."""

@@ -109,16 +109,13 @@ class Phase:
 
 @dataclass(frozen=True, slots=True)
 class FullState:
-    """Configuration and velocity of the whole robot.
-
-    Attributes:
-        q: base position [m], quaternion x y z w, 12 joint angles [rad], in the problem's frame: z
-            up, x ahead, its origin on the ground in the middle of the feet at the start.
-        v: base linear [m/s] and angular [rad/s] velocity in the base frame, joints [rad/s].
-    """
+    """Configuration and velocity of the whole robot."""
 
     q: Float[np.ndarray, "19"]
+    """Base position [m], quaternion x y z w, 12 joint angles [rad], in the problem's frame: z up, x
+    ahead, its origin on the ground in the middle of the feet at the start."""
     v: Float[np.ndarray, "18"]
+    """Base linear [m/s] and angular [rad/s] velocity in the base frame, joints [rad/s]."""
 
 
 @typed(error=TimelineError)

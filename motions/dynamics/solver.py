@@ -123,23 +123,14 @@ def _ends(problem: PhaseProblem) -> Float[np.ndarray, " k"]:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What is solved, and what is then asked of the plan.
+    """What is solved, and what is then asked of the plan."""
 
-    Attributes:
-        knots: the problem.
-        model: the robot.
-        limits: what the plan keeps.
-        weights: what being off costs.
-        tolerance: how far it may be from what was asked.
-        misses: measures how far that is.
-    """
-
-    knots: Knots
-    model: RobotModel
-    limits: PlanLimits
-    weights: Weights
-    tolerance: Tolerance
-    misses: Callable[[Knots, DynamicTrajectory], tuple[Miss, ...]]
+    knots: Knots  #: the problem
+    model: RobotModel  #: the robot
+    limits: PlanLimits  #: what the plan keeps
+    weights: Weights  #: what being off costs
+    tolerance: Tolerance  #: how far it may be from what was asked
+    misses: Callable[[Knots, DynamicTrajectory], tuple[Miss, ...]]  #: measures how far that is
 
     def plan(self, found: Solution) -> DynamicTrajectory:
         """The plan of what the search found."""

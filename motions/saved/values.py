@@ -36,13 +36,10 @@ _NUMBERS = "bif"  #: What NumPy calls truth values, whole numbers and floats
 @final
 @dataclass(frozen=True, slots=True)
 class Encoder:
-    """Turns values into JSON.
-
-    Attributes:
-        arrays: takes the arrays, by the names that JSON has for them; None where a file holds none.
-    """
+    """Turns values into JSON."""
 
     arrays: dict[str, np.ndarray] | None = None
+    """Takes the arrays, by the names that JSON has for them; None where a file holds none."""
 
     def encoded(self, value: object, where: str) -> Json:
         """``value`` as JSON has it; a member of an enum by its word, a leg by its name.
