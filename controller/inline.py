@@ -1,7 +1,7 @@
-"""What a notebook shows of a motion, a report, a recording or a sweep: a page, margins, a table.
+"""How a notebook shows a motion, a report, a recording or a sweep: a page, margins, a table.
 
-``go2_wbc.brief.inline_html`` finds ``html_of`` by the entry point ``go2_wbc.inline``: the packages
-below know of no page.
+``go2_wbc.brief.inline_html`` finds ``html_of`` by the entry point ``go2_wbc.inline``, so that the
+packages below need not know about pages.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 While one job is carried out others are refused, or wait for their turn. Slow preparation runs in a
 thread of its own. Every job is answered exactly once. The ROS 2 node, Unitree's sport service and
-teleoperation are built on it; it knows nothing of them.
+teleoperation are built on it; it does not depend on them.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """The control loop: one tick is read, check, snapshot, behaviour, whole-body QP, write, record.
 
-Where the QP's constraints contradict each other, the nearest answer is followed
-(``wbc.solvers``) and the tick is counted; if they give way gravely for ``grave_limit_time``, the
-robot is damped for good. Only here a QP failure is caught: the last good torque is held for one
-tick, then the robot is damped while the failure lasts, and for good after ``qp_patience`` ticks;
-every one is counted.
-A plant that fails, gives no new state, or gives one that is not finite, ends the behaviour too.
+Where the QP's constraints contradict each other, the relaxed QP (``wbc.solvers``) is solved and the
+tick is counted; if constraints are gravely violated for ``grave_limit_time``, the robot is damped
+for good. A QP failure is caught only here: the last good torque is held for one tick, then the
+robot is damped while the failure lasts, and for good after ``qp_patience`` ticks; every one is
+counted. A plant that fails, gives no new state, or gives one that is not finite, ends the behaviour
+too.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What a learner sees of the robot and does with it: names, units and order, described once.
+"""Observations and actions of a learner: names, units and order, described once.
 
 The environment, data sets and policies hold the numbers of a ``Layout``, one term after the other.
-``OBSERVATION`` and ``ACTIONS`` are the layouts; nothing here knows a training framework.
+``OBSERVATION`` and ``ACTIONS`` are the layouts; this module depends on no training framework.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""A loop in a thread of its own: its pace, work and log lines of others, lines that do not flood.
+"""A loop in a thread of its own: its pace, work from other threads, its log lines, rate-limited.
 
 Ctrl-C raises ``KeyboardInterrupt`` between two instructions of the main thread, also just after it
-has taken a lock. A lock of the loop that it kept so would leave the robot without commands. So
-whoever wants something of the loop hands in an errand and waits for the answer, and the loop has
-its lines logged by another thread, since it would wait for the lock of a log handler in the same
-way. All that the threads share are queues whose ``put`` never waits.
+has taken a lock. If this were a lock that the loop needs, the robot would get no more commands. So
+other threads do not lock the loop: they hand in an errand and wait for the answer. For the same
+reason another thread writes the loop's log lines, since a log handler has a lock. The threads share
+only queues whose ``put`` never waits.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The pilot: sequences behaviours into what a user asks for, and measures what came of it.
+"""The pilot: turns what a user asks for into a sequence of behaviours, and measures the result.
 
 Every public method is a procedure that returns what it measured, or raises ``Aborted`` with the
 reason in plain words. It knows nothing of users, locks or outcomes: ``GO2Controller`` turns

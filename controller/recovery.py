@@ -1,9 +1,9 @@
-"""What a robot on the ground does by joint servos alone: fold its legs, go limp, roll over.
+"""Motions of a robot on the ground, by joint servos alone: fold the legs, go limp, roll over.
 
 The trunk is round: with its legs folded the robot comes to rest on its belly or on its back. The
-thighs turn far enough to point past the back, so from there the legs of one side push against the
-ground and roll the robot over to the other side, onto its belly. A leg that a fall has left beside
-the trunk is jammed there; it comes free if its hip turns outwards first.
+thighs can point past the back, so from there the legs of one side push against the ground and roll
+the robot over to the other side, onto its belly. A leg that is jammed beside the trunk after a fall
+comes free if its hip turns outwards first.
 """
 
 from __future__ import annotations

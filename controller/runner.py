@@ -1,7 +1,7 @@
-"""Lets robot time pass until something is measured: inside calls, or in a background thread.
+"""Lets robot time pass until a condition is measured: inside calls, or in a background thread.
 
 Without ``realtime`` nothing moves between calls and every run is deterministic. With it, a thread
-ticks the loop all the time and calls wait for what they want to see.
+ticks the loop all the time and calls wait for their condition.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Drives a robot by keys: short commands at once, long ones as jobs in another thread.
 
-Knows nothing of terminals: ``press`` takes a key, ``status`` tells what is going on, ``news`` what
-has come of it.
+It does not depend on terminals: ``press`` takes a key, ``status`` returns the present state, and
+``news`` the outcomes since.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Arguments of public functions: what their annotations do not take is refused.
+"""Arguments of public functions: values that do not fit their annotations are refused.
 
     @typed(error=CommandError)
     def wait(seconds: float) -> None: ...
 
 ``wait("a while")``, ``wait(nan)`` and ``wait(1e300)`` raise CommandError, with the value and what
-would be right.
+is valid.
 """
 
 from __future__ import annotations

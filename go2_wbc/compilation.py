@@ -1,7 +1,7 @@
 """Functions that are compiled: plain Python with annotations.
 
-A ``subroutine`` is called by compiled code, a ``kernel`` by Python as well; Numba's signature is
-made from their annotations:
+A ``subroutine`` is called by compiled code, a ``kernel`` by Python as well. Numba's signature
+is made from the annotations:
 
     @subroutine
     def ground_at(g: Ground, x: float, y: float) -> float: ...
@@ -9,14 +9,14 @@ made from their annotations:
     @kernel
     def plan(now: Snapshot, s: Planner, c: Walk, target: Target) -> None: ...
 
-An argument may be a number, a flag, an array, a triple, or a record (``records``). Python gives a
-kernel records, and the kernel is entered with their rows: a call costs 0.2 us more than its work.
-A subroutine called from Python is the Python that it is written in. With ``GO2_WBC_PLAIN=1`` in the
-environment kernels are, too: a debugger steps from the planner into a foothold.
+An argument may be a number, a flag, an array, a triple, or a record (``records``). Python passes
+records to a kernel, which is entered with their rows: this costs 0.2 us per call. A subroutine that
+is called from Python runs as plain Python. With ``GO2_WBC_PLAIN=1`` in the environment kernels do,
+too: a debugger steps from the planner into a foothold.
 
-Numba compiles a kernel for this processor when it is first called, or by ``load_kernels``, about
-20 s for all, announced by one line of the log; see ``machine_code``, which keeps it between runs.
-No fast-math flag is set: the bits of a result depend on the inputs only.
+Numba compiles a kernel for this processor when it is first called, or by ``load_kernels``, about 20
+s for all, announced by one line of the log; see ``machine_code``, which keeps it between runs. No
+fast-math flag is set: the bits of a result depend on the inputs only.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """All numbers of the engine in one value, with overrides from TOML.
 
-Each part is a frozen dataclass beside its consumer, where units and provenance are written. A file
-overrides what it names and nothing else:
+Each part is a frozen dataclass beside its consumer, with units and sources. A file overrides the
+keys that it names and nothing else:
 
     [locomotion]
     height = 0.27

@@ -1,4 +1,4 @@
-"""Who touches the ground when: contact schedules as data.
+"""Which feet touch the ground when: contact schedules as data.
 
 A schedule is a list of events (a time, and the feet in stance from then on). Intervals are
 half-open: at the exact time of an event the new mode is in force; times within ``TIE`` of an event

@@ -1,17 +1,17 @@
-"""Machine code for kernels, by Numba: their types, their entries, compiling and loading them.
+"""Machine code for kernels, by Numba: their types and entries, compiling, storing and loading.
 
-Numba compiles functions of records to the same code as functions of arrays; but a record that
-Python passes costs 11 us. So a kernel's entry takes rows, looks at them as records, and has the
-written function put into it.
+Numba compiles functions of records to the same code as functions of arrays; but passing a record
+from Python costs 11 us. So a kernel's entry takes rows, views them as records, and inlines the
+written function.
 
-It is kept between runs, in files.
-The name of a file has a hash of all that the code in it depends on: the kernel's and its
-subroutines' own code and constants, their records, the versions and the processor. So a change of
-one function makes anew only what calls it. A file that is damaged is made anew; where no file can
-be written, kernels are compiled in every process.
+The code is kept between runs, in files. The name of a file has a hash of all that the code in it
+depends on: the code and constants of the kernel and its subroutines, their records, the versions
+and the processor. So after a change of one function only the kernels that call it are compiled
+again. A damaged file is made anew; where no file can be written, every process compiles the
+kernels.
 
-Loading is part of every start, so it must not take long: a list says which file belongs to which
-kernel as long as no source has changed, and loading needs nothing of Numba's compiler; see
+Loading is part of every start, so it must be fast: a list says which file belongs to which kernel
+as long as no source has changed, and loading needs nothing of Numba's compiler; see
 ``_what_running_takes``.
 """
 

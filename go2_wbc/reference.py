@@ -1,8 +1,8 @@
-"""What to track now: the hub type between everything that plans and the controller.
+"""What to track now: the interface between everything that plans and the controller.
 
-Gaits, motions, teleoperation and remote commands all end in a ``Reference``; the whole-body
-controller starts from one. ``JointReference`` is its little sister for the phases in which the
-trunk lies on the ground and no contact model holds.
+Gaits, motions, teleoperation and remote commands all produce a ``Reference``; the whole-body
+controller starts from one. ``JointReference`` is its counterpart for joint servos, for the phases
+in which the trunk lies on the ground and no contact model holds.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Ranges of the numbers of a frozen ``*Config``, and what it had of old, as tables above the class.
+"""Ranges of the numbers of a frozen ``*Config``, and its retired fields, as class decorators.
 
     @dataclass(frozen=True, slots=True)
     @retires(tolerance=TOLERANCE)
@@ -8,7 +8,8 @@
         share: float = 0.5
         angles: tuple[float, float] = (0.0, 0.1)
 
-Every number of it is positive but two, and ``tolerance``, a constant now, may still be given.
+Every number of this class is positive, except for ``share`` and ``angles``; ``tolerance``, now a
+constant, may still be given.
 """
 
 from __future__ import annotations

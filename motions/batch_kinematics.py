@@ -1,7 +1,7 @@
 """Kinematics of many instants at once, in compiled kernels.
 
-The heart is ``place``: where trunk and joints are when the feet stand in their places and the CoM
-is where it is wanted.
+The main function is ``place``: the pose of the trunk and the joint angles for given footholds and a
+given CoM.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
-"""What was worked out of motions, kept for motions that are nearly the same.
+"""Results computed for motions, kept for motions that are nearly the same.
 
-Most of what a check takes is work on single samples, and of an edited motion most samples are as
-they were, perhaps earlier or later. A ``Memory`` keeps it by what it was worked out of: a sample
-by its numbers, rounded to ``QUANTUM``, which is far below what any limit tells apart; a part that
-was compiled by its keys.
+Most of a check is work on single samples, and most samples of an edited motion are unchanged,
+perhaps shifted in time. A ``Memory`` stores each result under its input: for a sample its numbers,
+rounded to ``QUANTUM``, which is far below what changes any limit; for a compiled part its keys.
 """
 
 from __future__ import annotations

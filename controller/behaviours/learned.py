@@ -1,16 +1,16 @@
-"""A learned policy walks, and the whole-body controller beside it: each hands over to the other.
+"""A learned policy walks; it and the whole-body controller hand the robot over to each other.
 
-The planner of the walk goes on in the shadow of the policy: its references are of the measured
-state, and its clock follows the feet, each time one comes down. So the whole-body controller can
-take over in any tick. While one hands over to the other, the torques of both are mixed:
+While the policy walks, the gait planner runs along: its references start from the measured state,
+and its clock is synchronised with each touchdown. So the whole-body controller can take over in any
+tick. During a hand-over the torques of both are blended:
 
     tau = (1 - s) tau_wbc + s (kp (q_des - q) - kd v + f v)     s: the share of the policy
 
-where f is the joints' viscous friction that is fed forward: 0, but where the robot's own file has
-much of it, which no policy has met in training.
+where f is the viscous joint friction that is fed forward: 0, except for a robot whose own file has
+much of it, which no policy has seen in training.
 
-The policy has the robot while there is a command; without one the whole-body controller lets it
-come to rest, and stand.
+The policy controls the robot while there is a velocity command; without one the whole-body
+controller brings it to rest, and stands.
 """
 
 from __future__ import annotations

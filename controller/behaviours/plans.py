@@ -1,16 +1,16 @@
-"""Behaviours that play a motion plan: where, how they come to it, and for how heavy a robot.
+"""Behaviours that play a motion plan: placed in the world, entered, left, and scaled to the weight.
 
 On four feet the feedback holds a body that is heavier than its model, a little too low. In flight
-and on two feet there is no time for that, so the weight is felt before: with 9 % more mass a
-rear-up was up to 7 deg off its plan on the average, with what is felt here 4 deg at most.
+and on two feet there is no time for that, so the weight is measured before: with 9 % more mass a
+rear-up was up to 7 deg off its plan on average, with the measured weight 4 deg at most.
 
-A motion that is called off is left on a way out, to four loaded feet.
-A raised paw cannot just be put down: the plan knows the one way that was checked. So the plan is
-left along itself, by letting its clock run back, or on, to the nearest instant that is safe.
+A cancelled motion leaves the plan on a safe path to four loaded feet. A raised paw cannot just be
+put down, because only the plan's own path has been checked. So the plan's clock runs backwards or
+forwards to the nearest safe instant.
 
-Where feet swing to other places, or fewer than three stand, the robot is kept up by its momentum,
-and a clock that slows down, or turns round, would take that away. There the plan keeps its tempo
-until it stands again: a jump that has begun lands first.
+Where feet swing to other footholds, or fewer than three stand, the robot depends on its momentum,
+which a clock that slows down or reverses would take away. There the plan keeps its tempo until the
+robot stands again: a jump that has begun lands first.
 """
 
 from __future__ import annotations

@@ -1,22 +1,22 @@
-"""Standing: the feet stay where they are as long as that holds the robot, and step if it does not.
+"""Standing: the feet stay where they are while that keeps the balance, and step otherwise.
 
 The capture point (Pratt et al., Capture Point, Humanoids 2006), ``p + v / sqrt(g / h)``, is where
-an inverted pendulum of height ``h`` would have to put its foot to come to rest above it. Within the
-support polygon the feet need not move; outside the robot falls unless they do.
+an inverted pendulum of height ``h`` would have to put its foot to come to rest above it. While it
+is within the support polygon the feet need not move; outside, the robot falls unless they do.
 
 The steps are those of the walking planner. A push of 36 N s makes the robot as fast as it can walk,
-2.3 m/s, within a tenth of a second; so it walks on at a little less than its speed, in strides for
-that speed, until it is slow, instead of braking with all it has on feet that it leaves behind. The
-first stride has a flight, as those of a fast trot; in the others the feet stand for longer than in
-a trot ahead, since every flight costs height, of which a robot that goes aside at that speed has
-none to lose. Once it has come to rest the robot stands where it is.
+2.3 m/s, within a tenth of a second. So it walks on at a little less than its speed, with strides
+for that speed, until it is slow; braking at once would leave its feet behind. The first stride has
+a flight phase, like those of a fast trot. In the others the feet stand longer than in a forward
+trot, since every flight costs height, and a robot that moves sideways at that speed has none to
+lose. Once at rest the robot stands where it is.
 
-A foot that something lifts is no contact: it swings towards its place, and what the leg gives for
-that is its reaction on the trunk, as the QP has it, whether the foot moves or what lifts it holds
-it. So it is pressed back by what it is lifted with, and stands again once it is let go.
+A foot that something lifts counts as a swing foot: it swings towards its foothold, and the QP
+includes the reaction of the leg's effort on the trunk, whether the foot moves or is held. So the
+foot is pressed back with the force that lifts it, and stands again once it is released.
 
-A push does not wait until the ground has shown its friction: unless a walk has found it slippery,
-the steps count on as much as any walk does.
+A push does not wait until the ground has shown its friction: unless a walk has found the ground
+slippery, the steps use the largest friction that any walk uses.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Saved motions that a bridge plays: files of numbers, never code.
 
-Over a network they are asked for by their names in one folder, which is named where the bridge is
-started; nothing else of the machine can be named.
+Clients ask for them by file name in one folder, which is given when the bridge starts; no other
+file of the machine can be named.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 """What every subcommand of ``go2-wbc`` shares: exit codes, JSON, its options, a progress line.
 
-A subcommand is made of a function: its parameters are the options, its docstring is the help. A
-parameter by place is an argument, one by name an option: a flag if it is a bool, required if it has
-no default. What ``Annotated`` adds to the type: words, which are the help, or what stands for the
-value and the help; a tuple of what may be chosen; a function that makes a value of a text.
-``T | None`` is a T that may be missing, ``tuple[T, ...]`` several in a row, ``Sequence[T]`` several
-that each have the option before them. A dataclass stands for its fields, as a part of the help if
-it is annotated with a title.
+A subcommand is made from a function: its parameters are the options, its docstring is the help. A
+positional parameter is an argument, a keyword parameter an option: a flag if it is a bool, required
+if it has no default. ``Annotated`` adds to the type one of: a string, which is the help; two
+strings, the metavariable and the help; a tuple of choices; a function that converts a text to a
+value. ``T | None`` is an optional T, ``tuple[T, ...]`` takes several values in a row,
+``Sequence[T]`` repeats the option for each value. A dataclass stands for its fields, as a section
+of the help if it is annotated with a title.
 """
 
 from __future__ import annotations

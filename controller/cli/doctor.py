@@ -1,9 +1,9 @@
 """``go2-wbc doctor``: what is installed, what is missing, and the command that installs it.
 
-Each ``judge_...`` looks at one thing. ``version`` is the installed one, ``bounds`` are the versions
-that this project asks for, and a ``probe`` says how the import of a module went, in a process of
-its own: a library that crashes the interpreter, or takes the wrong shared object with it, is a
-finding and not the end of the program.
+Each ``judge_...`` checks one thing. ``version`` is the installed one, ``bounds`` are the versions
+that this project requires, and a ``probe`` reports the import of a module in a process of its own:
+a library that crashes the interpreter, or loads the wrong shared object, is a finding and does not
+end the program.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """``go2-wbc``: finds the subcommand, runs it, and turns errors into messages and exit codes.
 
 A subcommand is a function whose parameters are its options (see ``options``), and a line in
-``COMMANDS``. Only the module that was asked for is imported: help is quick, and a broken library
-cannot keep ``doctor`` from starting. ``run_program`` does the same for a program with other
+``COMMANDS``. Only the module of the chosen command is imported: so help is quick, and a broken
+library cannot keep ``doctor`` from starting. ``run_program`` does the same for a program with other
 subcommands.
 """
 

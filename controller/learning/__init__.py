@@ -1,7 +1,7 @@
-"""The simulated robot for learners: Gymnasium's environments, and the expert's data sets.
+"""The simulated robot for learning: Gymnasium environments, and data sets of the expert.
 
 Importing this registers the environments where Gymnasium is installed. So does
-``gymnasium.make("controller.learning:Go2-v0")``; version 1 of Gymnasium knows no entry points.
+``gymnasium.make("controller.learning:Go2-v0")``; version 1 of Gymnasium uses no entry points.
 """
 
 from __future__ import annotations

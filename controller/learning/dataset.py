@@ -1,8 +1,8 @@
-"""``record``: what the expert saw and did, as a folder of Parquet files that is one data set.
+"""``record``: observations and actions of the expert, as a folder of Parquet files, one data set.
 
-Each episode is a file of its own, written aside and renamed by the process that ran it: whoever
-kills them leaves whole episodes only, and who records again adds those that are missing. What rows
-depend on is kept with each; a folder takes only episodes that agree in it.
+Each episode is a file of its own, written to a temporary file and renamed by the process that ran
+it. So only whole episodes are left if the processes are killed, and a later run adds those that are
+missing. Each file stores what its rows depend on; a folder takes only episodes that agree in this.
 """
 
 from __future__ import annotations

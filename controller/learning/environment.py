@@ -1,8 +1,8 @@
-"""``Go2Env``: the simulated robot as Gymnasium's environment; nothing of the controller is inside.
+"""``Go2Env``: the simulated robot as a Gymnasium environment, without the controller.
 
-A step is one ``write`` of a plant whose control period is 0.02 s, in which the servo of the joints
-acts in every physics step. A reset brings the plant back and puts it into another world: no model
-is built anew but for another terrain. All that is random comes from the seed of ``reset``.
+A step is one ``write`` of a plant whose control period is 0.02 s, in which the joint servo acts in
+every physics step. A reset brings the plant back and puts it into another world; the model is built
+again only for another terrain. All random values come from the seed of ``reset``.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """An episode of the expert: ``GO2Controller`` walks, or plays a motion; what a learner needs of it.
 
-A row is a period of 0.02 s: the observation at its beginning, as ``OBSERVATION`` has it, and what
-the expert did until its end. In ticks i of the period it asks for the torques tau_i; the torque of
-the row is their mean, its joint targets are those whose servo comes nearest to them (least squares
-of kp (u - q_i) - kd v_i - tau_i over u):
+A row is a period of 0.02 s: the observation at its beginning, as in ``OBSERVATION``, and the
+expert's action until its end. In the ticks i of the period the expert asks for the torques tau_i.
+The torque of the row is their mean; its joint targets are those whose servo comes nearest to them
+(least squares of kp (u - q_i) - kd v_i - tau_i over u):
 
     u = mean(q_i + (tau_i + kd v_i) / kp)
 """

@@ -1,7 +1,7 @@
-"""The terms of the reward, by name: what is followed counts up to 1, what is not wanted below 0.
+"""The terms of the reward, by name: tracking gives up to 1, penalties are below 0.
 
-Of an error e, following counts exp(-e^2 / 0.25), as in legged_gym (Rudin et al., Learning to walk
-in minutes, 2022, table 1); all others are negative squares. A term is worth its weight a second.
+Tracking with an error e gives exp(-e^2 / 0.25), as in legged_gym (Rudin et al., Learning to walk in
+minutes, 2022, table 1); all other terms are negative squares. Weights are per second.
 """
 
 from __future__ import annotations

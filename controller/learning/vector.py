@@ -1,8 +1,8 @@
 """``Go2VectorEnv``: many environments, stepped together, in the worker processes of sweeps.
 
-Each process keeps an even share of them and steps it in one go; the calling one has a share, too:
-it would only wait. An environment whose episode is over is reset by the next step, whose action it
-ignores (Gymnasium's ``AutoresetMode.NEXT_STEP``).
+Each process has an even share of the environments and steps them in one go; so does the calling
+process, which would only wait otherwise. An environment whose episode is over is reset by the next
+step, whose action it ignores (Gymnasium's ``AutoresetMode.NEXT_STEP``).
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Cloning the trot: a network learns from the whole-body controller what the joints shall do.
+"""Cloning the trot: a network learns from the whole-body controller what the joints should do.
 
-DAgger (Ross, Gordon and Bagnell 2011): what the network does decides which states are visited, and
-the teacher says in each of them what it would do. It walks in the shadow: its planner and QP are
-given the measured state in every tick, while the plant follows the network, at first for a part of
-the time only. The label of a period is the joint target that comes nearest to the teacher's torques
-tau over its ticks k, with the servo's gains:
+DAgger (Ross, Gordon and Bagnell 2011): the network's actions decide which states are visited, and
+the teacher labels each of them with its own action. The teacher's planner and QP get the measured
+state in every tick, while the plant follows the network, at first for a part of the time only. The
+label of a period is the joint target that comes nearest to the teacher's torques tau over its ticks
+k, with the servo's gains:
 
     q* = mean_k (q_k + (tau_k + kd v_k) / kp)       min sum_k |kp (q* - q_k) - kd v_k - tau_k|^2
 """

@@ -2,8 +2,8 @@
 
     y = W3 tanh(W2 tanh(W1 x + b1) + b2) + b3
 
-Inputs and outputs are taken by mean and deviation while it is fitted; the network that is written
-has both in its first and last layer. Adam: Kingma and Ba 2015, algorithm 1.
+Inputs and outputs are normalised by mean and standard deviation during the fit; the network in the
+file has both in its first and last layer. Adam: Kingma and Ba 2015, algorithm 1.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""A learned policy: a network in an ONNX file, its sidecar, and what it remembers while it runs.
+"""A learned policy: a network in an ONNX file, its sidecar, and its memory while it runs.
 
-Each of its periods: the measured state -> one row of the observation, and those before -> network
+In each period: the measured state -> one row of the observation, with the rows before it -> network
 -> action -> joint targets, which the plant's servos follow (``sidecar`` has the equations). Phases
 are 0 where the front left foot touches down.
 """

@@ -1,19 +1,20 @@
-"""One second in a simulation that says whether the sidecar of a policy is right, or what is wrong.
+"""The probe: a second of simulation per trial tells if a policy's sidecar is right, or what is not.
 
-A policy was trained until it walked well with what its numbers mean. So among all meanings that
-they could have, the true one is that with which it walks best: follows the command, level and
-without bouncing. The probe lets it take over from a trot, for a second, as its sidecar says and
-with each one thing in it changed: another order of the joints, turned signs, a scale or a gain
-times a factor. Each run begins in the same state, and is marked by
+A policy was trained until it walked well with the correct sidecar. So of all possible sidecars the
+correct one is that with which it walks best: follows the command, level and without bouncing. The
+probe lets the policy take over from a trot for a second, with its sidecar and with one change at a
+time: another order of the joints, inverted signs, a scale or a gain times a factor. Each run begins
+in the same state, and has the score (lower is better)
 
     |v - v_des| / 0.1 + |w_z - w_des| / 0.2             mean velocity [m/s], turning rate [rad/s]
     + rms w_xy / 0.3 + rms v_z / 0.1 + rms tilt / 0.05  [rad/s], [m/s], [rad]
 
-over its last two thirds, and by 10 and more if it falls. What is changed where the mark is by far
-the best is what is wrong.
+over its last two thirds, and 10 or more if it falls. If one change has by far the best score, what
+it changes is wrong in the sidecar.
 
-It does not see what the policy hardly needs (half the joint velocities do for the clone), what is
-wrong in two places at once, default poses, clips, history, and clocks half a stride off.
+The probe does not find errors in values that the policy hardly uses (half the joint velocities are
+enough for the clone), two errors at once, default poses, clips, history, and clocks half a stride
+off.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The sidecar of a policy: what the numbers mean that go into its network and come out.
+"""The sidecar of a policy: what the inputs and outputs of its network mean.
 
 A TOML file beside the network, ``trot.toml`` for ``trot.onnx``. With s the ``signs`` and P the
 ``order`` of the joints, scale, default pose and gains in that order:
@@ -8,7 +8,7 @@ A TOML file beside the network, ``trot.toml`` for ``trot.onnx``. With s the ``si
     tau = kp (q_des - q) - kd v     evaluated by the plant, as by the joint boards of the robot
 
 The observation is one row: its terms one after the other, each ``scale * value``, clipped. With a
-history of n it holds n rows, as ``frames`` (row after row) or by ``terms`` (of each term n values).
+history of n it has n rows, as ``frames`` (row after row) or by ``terms`` (of each term n values).
 """
 
 from __future__ import annotations

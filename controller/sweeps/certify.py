@@ -1,10 +1,10 @@
 """``certify``: how often a motion is done in randomised simulated runs, with its interval.
 
-The interval of the rate is that of Clopper and Pearson (Biometrika, 1934): it holds the true rate
-with at least the confidence that is stated, whatever the rate is. If runs may end early, they end
-at the first number of runs, in the order of their seeds, at which the interval is as narrow as
-asked: so the result depends on the seeds only. An interval that is looked at again and again is a
-little too sure; who needs the exact confidence has all runs done.
+The interval of the rate is that of Clopper and Pearson (Biometrika, 1934): it contains the true
+rate with at least the stated confidence, whatever the rate is. If runs may end early, they end at
+the first number of runs, in the order of their seeds, at which the interval is as narrow as asked:
+so the result depends on the seeds only. An interval that is tested repeatedly has a little less
+than the stated confidence; for the exact confidence, do all runs.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""What carries a sweep: takes a function and items, gives what came of each as it ends.
+"""The engine of a sweep: takes a function and items, and yields each result as it is finished.
 
-A worker is a process with one thread for its BLAS that answers item by item, and ends with its
-parent, however that came. On Linux they are forked by ``multiprocessing``'s fork server, which has
-loaded the robot: it takes the time of one start, its workers next to none, and later sweeps of a
-process are under way at once. Where a fork is not safe (macOS) or unknown (Windows), every worker
-is started anew.
+A worker is a process with one BLAS thread that answers item by item, and ends when its parent ends,
+in whatever way. On Linux workers are forked by ``multiprocessing``'s fork server, which has loaded
+the robot: the server takes the time of one start, its workers next to none, and later sweeps of a
+process start at once. Where a fork is not safe (macOS) or not possible (Windows), every worker is
+started anew.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Workers on many machines: tasks of a Ray cluster, which ships items and gathers values.
+"""Workers on many machines: tasks of a Ray cluster, which sends items and collects results.
 
-What a task calls is what a local worker calls, in the same environment: the rows are the same.
-Without an address a cluster of this machine is started, which listens on the loopback only.
+A task calls the same function as a local worker, in the same environment: the rows are the same.
+Without an address a cluster on this machine is started, which listens on the loopback only.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""Rows, and the file of a sweep: an SQLite database to which each is added as it is finished.
+"""Rows, and the file of a sweep: an SQLite database to which each row is added when it is finished.
 
-A row is what a run with one seed gave, as named plain values.
+A row is the result of a run with one seed, as named plain values.
 
 Tables: ``about`` (what the rows depend on), ``columns`` (their names and kinds), ``rows`` and
-``failures``, by seed. A row is one transaction in a write-ahead log: whoever kills the process
-leaves whole rows only. The columns of ``rows`` have no declared type, because one would turn -0.0
-into 0.0; nan, which SQLite does not know, is NULL.
+``failures``, by seed. A row is one transaction in a write-ahead log: a killed process leaves whole
+rows only. The columns of ``rows`` have no declared type, because one would turn -0.0 into 0.0; nan,
+which SQLite does not have, is NULL.
 """
 
 from __future__ import annotations

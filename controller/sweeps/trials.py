@@ -1,7 +1,7 @@
-"""What a seed varies, a simulated robot under these conditions, and what it does by name.
+"""The conditions that a seed draws, a simulated robot under them, and the trials with a name.
 
-A gait or a push is a function from a seed to a row. A robot that fails is a row, too: it says why,
-and what was not measured is nan.
+A gait or a push is a function from a seed to a row. A robot that fails gives a row, too, with the
+reason; what was not measured is nan.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""What can break on a simulated robot, at a time that a test chooses.
+"""Faults of a simulated robot, at a time that a test chooses.
 
     plant.fault("motor", part="FL_calf_joint", at=3.0)
     plant.fault("foot_force", part="RR_foot", value=40.0)
 
-The kinds are in ``FaultKind``. Faults of sensors are put into what the sensors read, before
-anything is estimated of it.
+The kinds are in ``FaultKind``. Faults of sensors are put into the readings, before the estimator
+gets them.
 """
 
 from __future__ import annotations

@@ -1,15 +1,15 @@
 """Identifies the friction of every joint of a robot that lies on its belly.
 
-The legs are turned over the back, where they touch nothing. Then every joint in turn, of all four
-legs at once, is moved to and fro by its servo at several constant speeds. What the motor gives
+The legs are turned over the back, where they touch nothing. Then each joint in turn, of all four
+legs at once, is moved back and forth by its servo at several constant speeds. The motor's torque
 beyond gravity and inertia is friction: with the joint rows of the bias h (the trunk's contacts act
 on the rows of the base only),
 
     tau - h = dry * sign(v) + viscous * v + offset.
 
-Half the difference of the means of both directions is free of the offset, which holds the errors
+Half the difference of the means of both directions is free of the offset, which contains the errors
 of the model (Swevers, Verdonck & De Schutter, Dynamic model identification for industrial robots,
-2007). A straight line through them over the speeds, by least squares, gives dry and viscous.
+2007). A least-squares line through these values over the speeds gives dry and viscous.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""Ground that a simulated plant can stand the robot on, as plain data.
+"""Terrains for a simulated plant, as plain data.
 
-The robot starts at the origin, on ground of height 0, and is told nothing of it. Whatever has a
-direction rises or begins ahead of it, along the world's x axis; who turns the robot at its start
-goes that way aslant. Pits reach down to a floor below 0, and cut the ground into banks.
+The robot starts at the origin, on ground of height 0; the controller is told nothing about the
+terrain. Terrains with a direction rise or begin ahead of it, along the world's x axis; a robot with
+another initial heading meets them obliquely. Pits reach down to a floor below 0, and divide the
+ground into banks.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""How the feet of a plan land: when and where they meet the ground, not when it was planned.
+"""How the feet of a plan land: when they touch the ground, not when it was planned.
 
-What becomes of a foot that steps, from tick to tick:
+The state of a stepping foot, from tick to tick:
 
-    | it is  | the plan asks for       | contact | it will be   | and is asked to             |
+    | state  | the plan asks for       | contact | next state   | command                     |
     |--------|-------------------------|---------|--------------|-----------------------------|
     | down   | stance                  | any     | down         | stand                       |
     | down   | swing, as of now        | any     | in the air   | swing as planned            |
@@ -15,19 +15,19 @@ What becomes of a foot that steps, from tick to tick:
     | in air | stance, for longer      | no      | down         | stand; counted as missed    |
     | any    | joints                  | any     | down         | follow its joints           |
 
-- A foot that went on towards its place after it met the ground would push against it. The plan's
-  time is not changed by an early landing, so that a beat stays one.
-- A foot that were said to stand, but has no contact yet, would hang where it is: the controller
-  would keep it there, and count on a force that the ground does not give. After ``TIME_OUT`` it
-  counts as standing all the same: what has not been met by then is no uneven ground, and a contact
-  sensor that fails must not keep a leg in the air.
-- The load of a foot that stands is ramped from when it came down.
-- The ground's height is learnt from feet whose contact is measured, each once a landing.
-- While a foot stands, the others swing to the plan's places in the world: what one step was off,
-  the next one is not. In flight no leg can move the CoM, which goes on as it took off: the plan is
-  carried along with it (x and y) but for the first ``NEAR``, so that the feet come down below the
-  body nearly as planned, and the next jump starts from where this one has ended. Within ``NEAR``
-  they come down in their places, and the legs bring the body back over them.
+- A foot that continued to its planned foothold after an early touchdown would push against the
+  ground. The plan's time is not changed by an early landing, so motions stay on their beat.
+- A foot declared to stand before it has contact would stay in the air: the controller would hold it
+  there, and count on a force that the ground does not give. After ``TIME_OUT`` it counts as
+  standing nevertheless: uneven ground would have been reached by then, and a contact sensor that
+  fails must not keep a leg in the air.
+- The load of a stance foot is ramped up from its touchdown.
+- The ground's height is learnt from feet with measured contact, once per landing.
+- While a foot stands, the others swing to the plan's footholds in the world, so that the error of
+  one step is not in the next. In flight no leg can change the path of the CoM. There the plan moves
+  with the CoM (x and y), but for the first ``NEAR``: so the feet land below the body nearly as
+  planned, and the next jump starts from where this one has ended. Within ``NEAR`` the feet land at
+  their planned footholds, and the legs bring the body back over them.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 """The reference of a plan at an instant, from its cubics and its contacts, in the motion's frame.
 
 The curves are the body's x, y, z [m] and roll, pitch, yaw [rad], the angles of the twelve joints
-[rad], and the places of the four feet's centres [m]. The trunk's angular velocity and acceleration
-are those of Z-Y-X angles (Craig, Introduction to Robotics, 3rd ed., eq. 5.44):
+[rad], and the positions of the four feet's centres [m]. The trunk's angular velocity and
+acceleration are those of Z-Y-X angles (Craig, Introduction to Robotics, 3rd ed., eq. 5.44):
 
     w = (cos y cos p r' - sin y p',  sin y cos p r' + cos y p',  y' - sin p r')
 
-The load of a foot that stands is ramped: up from when it came down, and down to when it lifts off.
+The load of a stance foot is ramped up from its touchdown, and down to its lift-off.
 """
 
 from __future__ import annotations

@@ -1,20 +1,20 @@
 """A plan followed where the robot stands, tick by tick.
 
-The plan's reference is placed in the world; feet that step land when they meet the ground
-(``landing``); how far the robot is off it is noted; and the trunk's target is corrected for what
-stays of the error, integrated (see ``planning.trunk``), except in flight, where nothing can be
-corrected, and over two feet: none of their forces acts across them, so place or attitude is off
-until the next foot lands, and the integral of that only shakes the robot. Trots whose trunk rolled
-by 26 deg went 0.4 m aside by it, and fell.
+The plan's reference is placed in the world; stepping feet land when they touch the ground
+(``landing``); the tracking error is recorded; and the integral of the remaining error corrects the
+trunk's target (see ``planning.trunk``). The integral is held in flight, where nothing can be
+corrected, and on two feet: these give no moment about the line between them, so position or
+attitude is off until the next foot lands, and integrating that only excites the robot. Trots whose
+trunk rolled by 26 deg went 0.4 m aside by it, and fell.
 
-A payload is felt only after a while, and until then the correction holds it. Once it is known, what
-is done against it is taken out of the correction; the integral alone would do that in half a
-second, in which a robot that had just stood up with 4 kg 8 cm aside leaned by 6 deg.
+A payload is estimated only after a while; until then the correction holds it. Once the payload is
+known, its part is removed from the correction at once. The integral alone would need half a second
+for that, in which a robot that had just stood up with 4 kg 8 cm aside leaned by 6 deg.
 
-Of a solved plan on two feet or one, its own feedback is followed. On two feet the force that moves
-the CoM also turns the trunk: about the line between them no moment can be had. Following place and
-attitude each by its own gains then loses one of them, and the robot falls over in the end. The
-plan's own gains, of the Riccati equation along it, weigh all errors against each other as they will
+Solved plans on one or two feet are tracked with their own feedback. On two feet the force that
+moves the CoM also turns the trunk, since the ground gives no moment about the line between them.
+Separate gains for position and attitude then lose one of the two, and the robot falls over in the
+end. The plan's own gains, from the Riccati equation along it, couple all errors by how they will
 grow (Mastalli et al. 2022).
 """
 

@@ -1,25 +1,25 @@
-"""What holds a trunk to its plan against the dry friction of its joints, on three feet or more.
+"""Holds the trunk to its plan against the dry friction of the joints, on three feet or more.
 
-Standing feet turn every way of the trunk into ways of all joints, each of which takes its friction.
-A task of the QP is an acceleration, though, so its stiffness is the inertia that is moved times the
-gain: of roll, 0.07 kg m^2 times 200 /s^2, 15 N m/rad. The friction of 0.2 N m of each joint adds up
-to 1.2 N m about that axis, and so holds the trunk up to 4.6 deg off; 1.0 deg of pitch, 1.7 of yaw.
-Half of it is fed forward (``robot.motor``), by the speed of the joints: there is none of a trunk
-that is stuck.
+With the feet fixed, every motion of the trunk moves the joints of all stance legs, each with its
+friction. A task of the QP is an acceleration, so its stiffness is the moved inertia times the gain:
+in roll, 0.07 kg m^2 times 200 /s^2, 15 N m/rad. Friction of 0.2 N m in each joint adds up to 1.2 N
+m about that axis, and so holds the trunk up to 4.6 deg off; 1.0 deg in pitch, 1.7 in yaw. Half of
+the friction is fed forward (``robot.motor``), by the speed of the joints, which is zero while the
+trunk is stuck.
 
-So the trunk is held by more than while it trots, and its friction is learned. Along each axis of
-the base, with the error e of place and attitude, and the planned speed v,
+So the gains on the trunk are higher than in a trot, and the friction is learned. Along each axis of
+the base, with the error e of position and attitude, and the planned speed v,
 
     a = .. + K e + D e',      c' = rate * s * e,      s = tanh(v / slow),      |c| <= limit
 
-and ``c s`` is added to what is wanted. That is the adaptive compensation of Coulomb friction
-(Friedland & Park, IEEE Trans. Automatic Control 37(10), 1992) with the sign of the planned speed
-instead of the measured one: it turns round with the plan, before the robot is stuck, takes nothing
-of a robot at rest, and cannot swing one up that has no friction, of which c becomes negative. The
-integral of ``planning.trunk`` has to unwind at every turn instead, and holds what pulls one way.
+and ``c s`` is added to the target. This is adaptive compensation of Coulomb friction (Friedland &
+Park, IEEE Trans. Automatic Control 37(10), 1992) with the sign of the planned speed instead of the
+measured one: it reverses with the plan, before the robot is stuck, is zero at rest, and does not
+excite a robot without friction, for which c becomes negative. The integral of ``planning.trunk``
+has to unwind at every reversal instead, and is for constant disturbances.
 
-Solved parts of a plan, jumps above all, keep what they ask for: a trunk that lands late is no trunk
-that friction holds, and hops were 25 mm off by what they learned of it, instead of 15.
+Solved parts of a plan, jumps above all, keep their targets: a trunk that lands late is not held by
+friction, and hops were 25 mm off with what they learned from it, instead of 15.
 """
 
 from __future__ import annotations

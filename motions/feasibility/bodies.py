@@ -1,27 +1,27 @@
-"""The links as convex bodies: distances between those that must not touch, heights over the ground.
+"""The links as convex bodies: distances between those that must not touch, heights above ground.
 
 The distance of two convex bodies is found by GJK, the depth of an overlap by EPA (Gilbert, Johnson
 & Keerthi 1988; van den Bergen 2001), both in Coal. A hull contains its mesh, so a distance is never
-overrated.
+overestimated.
 
-Along a motion, most pairs need not be looked at in most samples, since none of their points can
-have moved far. Let the joints on the way from one link of a pair to the other turn by dq_k. Turned
-one after the other, the outermost first, joint k carries what hangs on it along as one rigid body,
-and moves no point of it by more than |dq_k| times the point's distance from the joint's axis, which
-a lever arm l_k bounds in every configuration. So no point of one body moves by more than
+Along a motion, most pairs need not be checked in most samples, since none of their points can have
+moved far. Let the joints between the two links of a pair turn by dq_k. If they turn one after the
+other, the outermost first, joint k moves the links beyond it as one rigid body, and no point of
+them by more than |dq_k| times the point's distance from the joint's axis, which a lever arm l_k
+bounds in every configuration. So no point of one body moves by more than
 
     m = sum_k l_k |dq_k|
 
 as seen from the other one. The signed distance of two convex bodies A and B is the greatest value,
 over all directions u of length 1, of -h(u), where h is the support function of A - B (Ericson 2005,
 *Real-Time Collision Detection*, sec. 9.3): positive apart, minus the depth when they overlap. A
-move of points by m at most changes h by m at most, so the distance d as well: d - m is a lower
-bound of what it has become. A pair whose bound lies above the distance of another one cannot be the
-nearest, and is left out. The least distance and its pair are those of looking at all of them.
+move of points by m at most changes h by m at most, and so the distance d: d - m is a lower bound of
+the new distance. A pair whose bound lies above the distance of another pair cannot be the nearest,
+and is left out. The least distance and its pair are the same as from checking all pairs.
 
-Over level ground the lowest point of a body is one of its convex hull's corners, the one that is
-farthest down: h = p_z + min_k r' c_k, with r the world's vertical in the link's frame, p_z the
-height of the link's joint and c_k the corners. The legs turn about x, y and y.
+Over level ground the lowest point of a body is a corner of its convex hull: h = p_z + min_k r' c_k,
+with r the world's vertical in the link's frame, p_z the height of the link's joint and c_k the
+corners. The legs turn about x, y and y.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """Checks of dynamic spans: by their own dynamics, at their own knots.
 
-Neither support nor zero-moment point says anything of flight and of few feet, and a spline across a
-change of contacts would invent forces. What counts is whether the plan obeys the equations of
-motion, M a + h = S' tau + J' f, step by step, with forces that the ground can give. Nothing that
-the planner says of itself is believed. Angles, speeds, torques, heights and collisions of the spans
-are judged with those of the rest of the motion.
+Support polygon and zero-moment point do not apply in flight or on one or two feet, and a spline
+across a change of contacts would imply forces that do not exist. Here the plan must obey the
+equations of motion, M a + h = S' tau + J' f, step by step, with forces that the ground can give,
+independently of what the solver reports. Angles, speeds, torques, heights and collisions of the
+spans are checked with those of the rest of the motion.
 """
 
 from __future__ import annotations

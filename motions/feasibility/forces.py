@@ -1,38 +1,38 @@
 """Checks of forces: can the feet carry the motion, do they slide, and can the motors do it?
 
-The equations of motion, M a + h = S' tau + J' f (Wieber, Tedrake & Kuindersma 2016), split into
-six rows of the base, in which no motor acts, and twelve of the joints:
+The equations of motion, M a + h = S' tau + J' f (Wieber, Tedrake & Kuindersma 2016), split into six
+rows of the base, in which no motor acts, and twelve of the joints:
 
-    w = M_b a + h_b = J_b' f               the wrench that the trunk needs (Newton-Euler)
-    tau = M_j a + h_j - J_j' f             what is left for the motors
+    w = M_b a + h_b = J_b' f               the wrench that the motion needs (Newton-Euler)
+    tau = M_j a + h_j - J_j' f             the torques of the motors
 
 M and h are Pinocchio's, with rotor inertia, v and a as in ``Trajectory`` (the base's in its own
 frame, so w too), f the forces of the ground on the rolling contact points in the frame of the
-motion. Of the f that give the trunk its wrench within the friction pyramid, the one that deviates
-least from an even share of the weight is taken, and along the ground from none, the less the less a
-foot bears, as the whole-body controller does it; see
-``wbc.trajectory_loads``.
+motion. Of all f within the friction pyramid that give this wrench, the one is taken that deviates
+least from equal vertical and zero tangential forces, with a larger weight on the tangential force
+of a foot with less load, as in the whole-body controller; see ``wbc.trajectory_loads``.
 
-The ground gives no force at once: MuJoCo's contacts need 20 ms (their ``solref``), as rubber and a
-leg's gears do. M a + h is therefore averaged over ``SPREAD`` samples before it is shared. Where a
-plan jumps from one sample to the next, the force of one is taken back by the other.
+Contact forces need time to build up: 20 ms in MuJoCo (its ``solref``), similar to rubber and a
+leg's gears. M a + h is therefore averaged over ``SPREAD`` samples before the forces are computed.
+Where a plan jumps from one sample to the next, the force of one sample is cancelled by the next.
 
 Friction is a cone, |f_t| <= mu f_z, here a pyramid of ``FACETS`` facets inside of it (2 % less).
-Two questions are asked:
+Two questions are answered:
 
-- With which least coefficient can the feet give what the trunk needs, however the load is shared?
-  With less, no controller can keep to the plan.
-- How far do the feet slide when the load is shared as the whole-body controller shares it? It asks
-  each foot for much the same force along the ground, so one that bears little may slide though the
-  others could hold; and a short slip moves little. Each foot is a block on the ground (Newmark
-  1965, *Effects of earthquakes on dams and embankments*): what exceeds friction accelerates it, and
-  friction stops it. How heavy that block is, and how much the joints hold it, was fitted to motions
-  in MuJoCo (``FOOT_MASS``, ``HELD``).
+- With which minimum coefficient can the feet give the wrench, for any distribution of the load?
+  With less, no controller can track the plan.
+- How far do the feet slide with the whole-body controller's distribution of the load? It asks each
+  foot for nearly the same tangential force, so one with little load may slide though the others
+  could hold; and a short slip moves little. Each foot is a sliding block (Newmark 1965, *Effects of
+  earthquakes on dams and embankments*): the force in excess of friction accelerates it, and
+  friction stops it. The mass of the block, and the force by which the joints hold it, were fitted
+  to motions in MuJoCo (``FOOT_MASS``, ``HELD``): a foot with 5 N on it that lacks 2 N hardly
+  slides.
 
-Where a leg turns fast, a foot creeps as well, however rough the ground is. A constraint of MuJoCo
-asks for J a = -b J v (Todorov, *Convex and analytically-invertible dynamics with contacts and
-constraints*, ICRA 2014) and leaves out the derivative of J. What is left out moves the foot at the
-speed dJ/dt v / b, and as the plan's feet rest, dJ/dt v = -J a. Fast rocking makes 13 mm of it.
+Where a leg turns fast, a foot also creeps, on any friction. A contact constraint of MuJoCo asks for
+J a = -b J v (Todorov, *Convex and analytically-invertible dynamics with contacts and constraints*,
+ICRA 2014) and leaves out the derivative of J. The missing term moves the foot at the speed dJ/dt v
+/ b, and as the plan's feet rest, dJ/dt v = -J a. Fast rocking makes 13 mm of it.
 """
 
 from __future__ import annotations

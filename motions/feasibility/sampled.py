@@ -1,9 +1,9 @@
-"""What a check works out of single samples and those beside them, kept for the next motion.
+"""Results of a check for single samples and their neighbours, stored for the next motion.
 
-Of an edited motion most samples are those of the last one, perhaps earlier or later. What has
-changed lies between: that is worked out anew, from where the robot stands on all feet some samples
-before it to where it stands so after it, and put in place of what was there. Sums over a motion,
-and what the controller does about its errors, go on for longer, and are not among it.
+Most samples of an edited motion are those of the previous one, perhaps shifted in time. Only the
+changed part is computed again, from where the robot stands on all feet some samples before it to
+where it does so after it, and replaces the old part. Sums over a motion, and the controller's
+corrections, last longer, and are not stored.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""What would make a refused motion feasible: the least change of tempo, size, height or shifts.
+"""Changes that make a refused motion feasible: the least change of tempo, size, height or shifts.
 
 Each kind of change is a call that the author can append to the motion. Its number is searched on a
-grid as coarse as what is printed: up a ladder until the check passes at a chance of ``AIM``, then
-by bisection between the last number that did not and the first that did. So what is suggested is
-what was checked, and not the border of what can be done, beside which half of all motions fail.
-Where no change leads as far inside, those that just pass are better than none.
+grid as coarse as the printed digits: it grows until the check passes with a probability of ``AIM``,
+then is bisected between the last number that did not pass and the first that did. So the suggestion
+is exactly what was checked, and not at the border of feasibility, where half of all motions fail.
+If no change reaches this probability, changes that just pass are suggested.
 """
 
 from __future__ import annotations

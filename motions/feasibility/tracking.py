@@ -1,21 +1,21 @@
-"""How far the trunk is off its plan: by friction, by what the ground lacks, by tipping over.
+"""How far the trunk is off its plan: by joint friction, by missing contact forces, by tipping over.
 
 The controller feeds forward a part of the friction of the joints (``robot.joint_friction``). With
-the feet in their places, the twist t of the trunk turns the standing legs by T t, so the rest r of
-their friction moves the trunk like a force T' r, against the inertia of trunk and legs together
-(virtual power; Featherstone, *Rigid Body Dynamics Algorithms*, 2008, sec. 3.4):
+the feet fixed, the twist t of the trunk moves the joints of the stance legs by T t, so the
+remaining friction r acts on the trunk as the force T' r, against the inertia of trunk and legs
+together (virtual power; Featherstone, *Rigid Body Dynamics Algorithms*, 2008, sec. 3.4):
 
     [1 T']  M  [1]  a  =  - T' r,        T = - J_legs^-1 J_base
               [T]
 
-The controller pulls the trunk back with its gains. Light as the trunk is against the friction of
-four hips, a roll lags by degrees where nothing else does: 9 at 190 deg/s.
+The controller pulls the trunk back with its gains. The trunk is so light, compared with the
+friction of four hips, that a roll lags by degrees where all other values are small: 9 at 190 deg/s.
 
-Over three feet nothing pulls back a trunk whose zero-moment point is at their edge. The foot that
-bears least lifts off, and the trunk tips over the line between the others. With the force F that
-the feet give, the height z of the CoM and the distance d of the plan's zero-moment point from the
-edge, negative outside, that is a pendulum (Kajita et al., *The 3D linear inverted pendulum mode*,
-IROS 2001):
+On three feet nothing pulls back a trunk whose zero-moment point is at the edge of their triangle.
+The foot with the least load lifts off, and the trunk tips over the line between the others. With
+the force F of the feet, the height z of the CoM and the distance d of the plan's zero-moment point
+from the edge, negative outside, this is a pendulum (Kajita et al., *The 3D linear inverted pendulum
+mode*, IROS 2001):
 
     e'' = max(- kp e - kd e',  F / (m z) (e - d)),    e >= 0
 """

@@ -1,7 +1,7 @@
-"""Flights and few feet: calls whose motion is solved, since no curve that one writes obeys physics.
+"""Jumps, rears and lifts: calls whose path is solved, since written curves would not obey physics.
 
-Each makes a dynamic block: phases for the planner of ``motions.dynamics``, from standing at home to
-standing at home. A block takes the whole robot; what comes after it counts from where it lands.
+Each makes a dynamic block: phases for the solver of ``motions.dynamics``, from standing at home to
+standing at home. A block takes all tracks; later offsets are relative to where it lands.
 """
 
 from __future__ import annotations

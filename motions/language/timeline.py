@@ -2,15 +2,15 @@
 
 A ``Timeline`` is a value; every method returns a longer one. Time is a cursor that each call moves
 on by ``over`` seconds (beats, after ``bpm`` or ``on_beats``); ``at`` puts it elsewhere and
-``together`` runs parts side by side. Places are offsets from the pose in which the motion starts: x
-ahead, y left, z up.
+``together`` runs parts side by side. Positions are offsets from the pose in which the motion
+starts: x ahead, y left, z up.
 
     Timeline().body(pitch=deg(15), z=-0.05, over=0.8).hold(0.4).home(over=0.8)
 
-Steps put feet in new places; from then on places count from these.
+Steps put feet on new footholds; from then on offsets are relative to these.
 
-A foot that is raised is off the ground until it is put down; the body first moves over the feet
-that stay, unless the motion is made with ``balance=False``.
+A raised foot is off the ground until it is put down; before it is raised the body moves over the
+other feet, unless the motion is made with ``balance=False``.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Which call of an author's file wrote which part of a timeline, for who edits the file.
+"""Which call of an author's file wrote which part of a timeline, for programs that edit the file.
 
-While ``traced``, every public call of a ``Timeline`` leaves a ``CallMark`` among its keys, which
-the calls after it shift, stretch and mirror with the others; ``separated`` takes them out again. A
-call is known by where it ends in its file: chained calls start at the same place, and no two end at
-one (``co_positions``, PEP 657).
+While ``traced``, every public call of a ``Timeline`` adds a ``CallMark`` to its keys, which later
+calls shift, stretch and mirror with the others; ``separated`` removes the marks. A call is
+identified by its end in the file: chained calls start at the same position, but no two end at the
+same one (``co_positions``, PEP 657).
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 """``beats``: the tempo, the beats and the bars of a song, found with librosa (extra ``[music]``).
 
-librosa reads how strongly notes begin and places beats by dynamic programming (Ellis, "Beat
-Tracking by Dynamic Programming", 2007). Around that: the tempo is chosen among several by how well
-all of the song agrees with it, and every beat is placed where the notes around it say, so that the
-error is a few milliseconds and no frame of the analysis.
+librosa computes the onset strength and places beats by dynamic programming (Ellis, "Beat Tracking
+by Dynamic Programming", 2007). In addition, the tempo is chosen among several by how well it fits
+the whole song, and every beat is placed by the onsets around it, so that the error is a few
+milliseconds and not a frame of the analysis.
 
 A bar begins where the bass is strong and the harmony changes (Goto and Muraoka, "Real-time Beat
-Tracking for Drumless Audio Signals", 1999). So of every metre and every first beat the one is taken
-on whose beats both are farthest above the others', in standard errors.
+Tracking for Drumless Audio Signals", 1999). So of all metres and first beats the one is taken for
+which both are highest above the other beats, in standard errors.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Dances: moves in an order that a seed chooses, on the beats of a song.
+"""Dances: moves in an order drawn by a seed, on the beats of a song.
 
-The robot answers a little late, and later with its trunk than with a foot. So a dance is written
-ahead of the song by that much, and what is on the beat is what is seen.
+The robot follows with a small delay, its trunk with a larger one than its feet. So a dance is
+written ahead of the song by this delay, and the visible motion is on the beat.
 """
 
 from __future__ import annotations

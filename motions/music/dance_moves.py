@@ -1,7 +1,7 @@
-"""What a dance is made of: short moves of whole pulses, each with an accent on every pulse.
+"""The moves of a dance: short, of whole pulses, each with an accent on every pulse.
 
 A pulse is a beat, or a few; see ``pulses_of``. A move starts half a pulse before its first accent
-and ends half a pulse after its last, where it began; so any move can follow any other.
+and ends half a pulse after its last, in its initial pose; so any move can follow any other.
 """
 
 from __future__ import annotations

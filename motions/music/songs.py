@@ -1,7 +1,7 @@
-"""Sounds from and to files, and songs made by code: a click track, and drums with bass and chords.
+"""Sounds from and to files, and synthetic songs: a click track, and drums with bass and chords.
 
-Beat finders and dances are measured on the latter: nothing needs to be downloaded, and the instants
-of their beats are given, not estimated.
+Beat trackers and dances are measured on the latter: nothing needs to be downloaded, and the times
+of their beats are known exactly.
 """
 
 from __future__ import annotations

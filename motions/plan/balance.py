@@ -1,22 +1,22 @@
-"""Where the trunk goes so that the CoM stays over the feet that stand, when others are raised.
+"""Where the trunk moves so that the CoM stays over the stance feet while others are raised.
 
-At every key during a raise, PlaCo's inverse kinematics finds a place of the trunk whose CoM keeps a
-distance to the edges of the support polygon, with the attitude, the height and the raised leg as
-written. Between those instants the trunk moves smoothly.
+At every key during a raise, PlaCo's inverse kinematics finds a position of the trunk for which the
+CoM keeps a distance to the edges of the support polygon, with the attitude, the height and the
+raised leg as written. Between those instants the trunk moves smoothly.
 
-While feet step, the CoM goes so that the ground can hold it, near to where it was wanted. With its
+While feet step, the CoM moves so that the ground can support it, near to its written path. With its
 height z, the CoM c and the zero-moment point p of an inverted pendulum are related by
 
     p = c - z / (g + z'') c''                                       (Kajita et al. 2003, eq. 3)
 
-and p must stay among the feet that stand: a margin inside their polygon, or, of two feet, near the
-line between them. So the way e that is added to c is a uniform cubic spline, whose coefficients
+and p must stay between the stance feet: a margin inside their polygon, or, with two feet, near the
+line between them. So the offset e that is added to c is a uniform cubic spline, whose coefficients
 minimise
 
     integral of |e|^2 + tau^6 |e'''|^2 + rho |what is beyond the edges|^2,
 
-a convex problem without hard constraints: Newton's method on its pieces ends after some ten steps,
-and where no way keeps all margins the least bad one comes out, for the check to judge.
+a convex problem without hard constraints: Newton's method on its pieces ends after some ten steps.
+If no offset keeps all margins, the result violates them least, and the check judges it.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""Where a timeline falls into parts that can be compiled for themselves, and kept.
+"""Splits a timeline into parts that can be compiled separately, and stored.
 
 A part begins and ends with the robot at rest, standing at home on the feet that it has stepped to:
-what is written before does not matter after it. Splines of parts are clamped there; so are those of
-the whole, as good as, after a pause, or between moves by minimum jerk, which rest there.
+it does not depend on what is written before. The splines of parts have zero speed at both ends; so,
+to good accuracy, have those of the whole motion after a pause, or between minimum-jerk moves, which
+rest there.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Timeline -> plan: the trunk's path, the legs' joints and the contacts, as smooth curves.
 
 The tracks are sampled a hundred times a second, the legs solved in closed form, and cubic splines
-laid through the CoM, the attitude and the joints; so positions, velocities and accelerations of a
-plan are each other's derivatives. What cannot be done as written does not end in a near miss: it is
-kept in ``problems``, which the feasibility check reports.
+laid through the CoM, the attitude and the joints; so velocities and accelerations of a plan are the
+derivatives of its positions. What cannot be done as written is listed in ``problems``, which the
+feasibility check reports.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Timeline -> plan: what is written is compiled, dynamic blocks are solved, and both are joined.
+"""Timeline -> plan: written parts are compiled, dynamic blocks are solved, and both are joined.
 
-Each part is made in a frame of its own, on the ground below the feet where it starts; so what
-follows a jump counts from where it lands. All of them rest standing where they meet.
+Each part is made in a frame of its own, on the ground below the feet where it starts; so later
+parts are relative to where a jump lands. All parts are at rest, standing, where they join.
 
-Where the nearest motion is asked for, parts that break a limit are cut out from rest to rest, and
+If the nearest motion is asked for, parts that break a limit are cut out from rest to rest, and
 replaced by the nearest that the robot can do.
 """
 

@@ -1,7 +1,7 @@
-"""Tracks of a timeline as functions of many instants at once: where trunk and legs shall be.
+"""Tracks of a timeline as functions of many instants at once: targets of trunk and legs.
 
 Everything is in the frame of the motion: z up, x ahead, its origin on the ground in the middle of
-the four feet as they stand at first. Offsets count in the frame of the feet as they stand by then.
+the four feet as they stand at first. Offsets are in the frame of the feet as they then stand.
 """
 
 from __future__ import annotations

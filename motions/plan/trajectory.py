@@ -1,9 +1,9 @@
-"""A plan as a trajectory of the whole robot: what every joint would do if all went as planned.
+"""A plan as a trajectory of the whole robot: the motion of every joint under perfect tracking.
 
-The references say where the CoM, the trunk's attitude and the raised legs shall be. The rest
-follows: standing feet stay in their places, so the trunk's place is the one that puts the CoM where
-it is wanted, and the standing legs' angles come from closed-form inverse kinematics. Velocities and
-accelerations are those of a cubic spline through the samples. Dynamic spans bring their own states.
+The references give the CoM, the trunk's attitude and the raised legs. The rest follows: stance feet
+stay at their footholds, so the trunk's position is the one that puts the CoM on its reference, and
+the stance legs' angles come from closed-form inverse kinematics. Velocities and accelerations are
+those of a cubic spline through the samples. Dynamic spans have their own states.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""What a motion is made of as JSON and arrays, and back: numbers, words, lists and dataclasses.
+"""The parts of a motion as JSON and arrays, and back: numbers, words, lists and dataclasses.
 
-Reading goes by the annotations of the dataclasses, so that a new kind of key, or a new field of a
-plan, needs nothing here.
+Reading follows the annotations of the dataclasses, so that a new kind of key, or a new field of a
+plan, needs no change here.
 
-Every file begins with which format it is, which version of it, and who wrote it.
+Every file begins with its format, the format's version, and the program that wrote it.
 """
 
 from __future__ import annotations

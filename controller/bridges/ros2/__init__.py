@@ -1,8 +1,8 @@
 """ROS 2: the robot as a node (``serve``), and a client with ``GO2Controller``'s methods.
 
-Here are the names of what the server offers. Nothing of ROS is imported until ``serve`` or
-``GO2ControllerNode`` is asked for; without the extra ``[ros2]`` that raises ``MissingDependency``,
-which names the line that installs it.
+This module has the names that the server offers. ROS is imported only when ``serve`` or
+``GO2ControllerNode`` is used; without the extra ``[ros2]`` that raises ``MissingDependency``, with
+the line that installs it.
 """
 
 from __future__ import annotations

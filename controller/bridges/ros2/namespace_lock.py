@@ -1,8 +1,9 @@
-"""One server for a namespace: a lock among the processes of a machine, and a look at the graph.
+"""One server per namespace: a lock among the processes of a machine, and a check of the ROS graph.
 
 Discovery cannot tell which of two servers that start in the same second is the first. The kernel
-can: it gives a socket's name to one process, and takes it back at its end, also after ``kill -9``.
-Servers of other machines are only seen in the graph, some time after they have started.
+can: it gives a socket's name to one process, and releases it when that process ends, also after
+``kill -9``. Servers on other machines are only seen in the graph, some time after they have
+started.
 """
 
 from __future__ import annotations

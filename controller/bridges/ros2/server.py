@@ -1,11 +1,11 @@
 """The robot as a ROS 2 node: MuJoCo, the whole-body controller and the topics in one loop.
 
-Everything but the action runs in one thread: after every control period the loop asks for calls
-and commands, publishes what is due, and sleeps if it is to keep the pace of the wall clock. What
-goes wrong in here is logged and counted; it never stops the control of the robot.
+Everything but the action runs in one thread: after every control period the loop polls for calls
+and commands, publishes what is due, and sleeps if it has to keep the pace of the wall clock. Errors
+in this file are logged and counted; they never stop the control of the robot.
 
-An executor takes 0.1 ms a turn to find that there is nothing to do, and half a millisecond for a
-callback; asking a handle takes 2 us. The handles are not documented: that is why the extra pins
+An executor takes 0.1 ms per turn to find that there is nothing to do, and half a millisecond for a
+callback; polling a handle takes 2 us. The handles are not documented, which is why the extra pins
 the version of rclpy.
 
 The action plays motions: goal, feedback with progress, cancel, result. Goals are rare, so it has a

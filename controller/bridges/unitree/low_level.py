@@ -1,9 +1,9 @@
-"""Low-level control: ``rt/lowcmd`` and ``rt/lowstate`` as ours, both ways, and the robot's gate.
+"""Low-level control: ``rt/lowcmd`` and ``rt/lowstate`` in both directions, and the robot's guards.
 
-Commands are checked before they reach a motor. One that is broken is refused, counted and reported;
-when no good one has come for a while, the robot is damped.
+Commands are checked before they reach a motor. An invalid command is refused, counted and reported;
+without a valid one for a while, the robot is damped.
 
-Between the controller and the motors stand guards: limits, a soft start, reasons to stop.
+Between the controller and the motors are guards: limits, a soft start, reasons to stop.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Unitree's sport service in names and numbers (unitree_sdk2, ``go2/sport`` and ``rpc``).
 
-Unitree has renumbered its procedures more than once. These are those of robots from V1.1.6 on, from
-``unitree_sdk2py/go2/sport/sport_api.py`` of unitree_sdk2_python, which keeps some of before beside
-them: 1018, 1026, 1033. ``BodyHeight`` (1013) is of the clients before those.
+Unitree has renumbered its procedures more than once. These are the ids of robots from V1.1.6 on,
+from ``unitree_sdk2py/go2/sport/sport_api.py`` of unitree_sdk2_python, which also keeps some older
+ones: 1018, 1026, 1033. ``BodyHeight`` (1013) is of the clients before those.
 """
 
 from __future__ import annotations

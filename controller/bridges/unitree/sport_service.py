@@ -1,8 +1,9 @@
 """Unitree's sport service on our robot: requests in, actions out, one at a time.
 
 A request is answered when its action is done, or after ``PATIENCE`` if it is still running then (0:
-it has begun), since Unitree's clients wait for one second by default. One that meets a running
-action waits for it as long, then is answered 4205. ``Damp`` and ``StopMove`` never wait.
+it has begun), since Unitree's clients wait for one second by default. A request during another
+action waits equally long for that action, then is answered 4205. ``Damp`` and ``StopMove`` never
+wait.
 """
 
 from __future__ import annotations

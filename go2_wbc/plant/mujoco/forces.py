@@ -1,8 +1,8 @@
-"""Where the Go2's quantities are inside a compiled MuJoCo model, and what forces act on it there.
+"""Indices of the Go2's quantities in a compiled MuJoCo model, and the forces that act on it there.
 
 MuJoCo's conventions (quaternion w x y z, linear velocity in the world) end here. Forces are pushes,
-which last and overlay, and contacts as measured. A held foot is a point on a spring and a damper,
-which give way to no more than a force:
+which have a duration and may overlap, and contacts as measured. A held foot is a point on a spring
+and a damper, whose force is limited:
 
     f = k (p_held - p) - d v,  |f| <= f_most
 """

@@ -1,10 +1,10 @@
 """A lidar like the L1 below a Go2's nose, or a depth camera in it, on a simulated plant's terrain.
 
-The lidar's rays fill a cone evenly, along a spiral that begins anew in each scan, as the sensor
-never repeats its pattern; the camera's are those of few, large pixels. They are cast against a
-model of the ground alone: against the meshes of the robot as well it took 100 times as long. The
-legs stand in the way all the same: a ray that passes within ``LEG_RADIUS`` of one's axis returns
-nothing, as a driver leaves the robot itself out.
+The lidar's rays fill a cone evenly, along a spiral that starts differently in each scan, as the
+sensor never repeats its pattern; the camera's rays are those of few, large pixels. Rays are cast
+against a model of the ground alone: against the meshes of the robot as well it took 100 times as
+long. The legs block rays nevertheless: a ray that passes within ``LEG_RADIUS`` of a leg's axis
+returns nothing, just as a driver removes points on the robot itself.
 """
 
 from __future__ import annotations

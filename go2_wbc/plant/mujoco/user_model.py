@@ -1,13 +1,13 @@
-"""Loads a user's own MJCF or scene of a robot, checks it, and adds what may be added.
+"""Loads a user's own MJCF or scene of a robot, checks it, and adds what may be missing.
 
 The file must have the robot's twelve joints below one body with a free joint, and its four feet as
 bodies ``FL_foot`` or geoms ``FL_foot`` or ``FL``. Added when absent: a floor, a torque motor for a
-joint that no actuator drives, and the IMU. It must have the size of the robot that is controlled:
-another robot with joints of these names is refused, and named if there is a profile of it.
-Everything else stays as the file says, except that the time step is the plant's. An actuator that
-is not a plain torque motor is refused, never replaced; so are angles that must be degrees, and
-ranges that keep the robot from folding its legs. ``starter_scene`` writes
-one to begin with: the robot, a box on its back, a ramp, and keyframes.
+joint that no actuator drives, and the IMU. It must have the size of the controlled robot: another
+robot with joints of these names is refused, and named if there is a profile of it. Everything else
+stays as in the file, except for the time step, which is the plant's. An actuator that is not a
+plain torque motor is refused, never replaced; so are angles that must be degrees, and ranges that
+keep the robot from folding its legs. ``starter_scene`` writes a file to start from: the robot, a
+box on its back, a ramp, and keyframes.
 """
 
 from __future__ import annotations
