@@ -41,12 +41,12 @@ class GO2Controller:
     """A Unitree Go2 that stands, sits, walks and gives a high five.
 
     By default it drives its own robot in MuJoCo, headless, as fast as the CPU allows; time passes
-    only inside calls, so runs are deterministic. With ``realtime=True`` the robot lives in a
+    only inside calls, so runs are deterministic. With ``realtime=True`` the simulation runs in a
     background thread at wall-clock pace.
 
-    A blocking call returns True only when the measured state shows that the thing was done;
-    otherwise False, with the reason in ``last_outcome``. It raises ModeError after a fall or while
-    another one runs, and all raise ClosedError once the robot is closed.
+    A blocking call returns True only when the measured state shows that it was done; otherwise
+    False, with the reason in ``last_outcome``. It raises ModeError after a fall or while another
+    one runs, and all raise ClosedError once the robot is closed.
 
     Example:
         >>> with GO2Controller() as go2:

@@ -63,13 +63,13 @@ _GAVE_WAY, _NOTED_AT = (_NOTED.fields[name].start for name in ("gave_way", "time
 
 
 class Telemetry:
-    """Records ticks; the oldest are dropped when the ring is full.
+    """Records ticks; the oldest are dropped when the ring buffer is full.
 
     Attributes:
         qp_failures: ticks in which the QP had no solution, over the whole run.
-        relaxed_ticks: ticks in which constraints of the QP had to give way.
-        grave_ticks: those of them in which they gave way by more than ``wbc.solvers.LIMITS``.
-        payload: what the robot is believed to carry beside its own parts.
+        relaxed_ticks: ticks in which the QP was relaxed.
+        grave_ticks: those of them with a violation beyond ``wbc.solvers.LIMITS``.
+        payload: the estimated payload.
         missed_deadlines: ticks that were not done when the next was due, at the wall clock's pace.
         explains: whether the multipliers of the whole-body QP are recorded, too; may be set at any
             time.

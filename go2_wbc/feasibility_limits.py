@@ -11,77 +11,77 @@ from go2_wbc.validation import POSITIVE, ranged
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE)
 class FeasibilityLimits:
-    """What a motion must keep. Own choice, set by comparing verdicts with simulated runs.
+    """Limits that a motion must keep. Own choice, set by comparing verdicts with simulated runs.
 
     Attributes:
-        reach: distance [m] by which a foot's place may be out of the leg's reach, standing or
-            raised: foot or trunk give way by as much. Of 21 motions drawn for it that missed up to
-            15 mm all were done; standing, some from 17 mm on slid.
+        reach: distance [m] by which a foot's position may be out of the leg's reach, standing or
+            raised: foot or trunk are displaced by as much. Of 21 motions drawn for it that missed
+            up to 15 mm all were done; of standing feet, some slid from 17 mm on.
         torque_share: share of the torque limit that a plan may use; 10 % are for feedback. Of 12
-            motions drawn for it that reached 0.85 to 0.90 and broke nothing else 9 were done, and
-            none saturated a motor; of 12 from there to 1 the half.
-        solved_torque_share: the same in solved parts. They are solved for 0.85, so this is what one
-            reaches that would need more: the robot was on its feet after these, but slid and
-            turned.
-        slip: greatest distance [m] that a standing foot may slide.
-        foot_load: least normal force [N] of a foot that stands: 2 % of the weight; leans with 4 N
-            were done.
+            motions drawn for it that reached 0.85 to 0.90 and broke no other limit 9 were done, and
+            none saturated a motor; of 12 from there to 1, half.
+        solved_torque_share: the same in solved parts. They are solved for 0.85, so a part at this
+            limit needs more: the robot stayed on its feet after these, but slid and turned.
+        slip: greatest distance [m] that a stance foot may slide.
+        foot_load: least normal force [N] of a stance foot: 2 % of the weight; leans with 4 N were
+            done.
         support: least distance [m] of the CoM to the edges of the support polygon.
         zero_moment: the same for the zero-moment point.
         off_line: greatest distance [m] of the zero-moment point from the line between two feet, and
             of it and the CoM outside of three that stand for ``pair_time`` at most.
-        pair_time: longest time [s] on two feet, or on three with the CoM beside them; in it a trunk
-            that is off balance falls four times as far off, exp(t / sqrt(0.29 m / g)).
+        pair_time: longest time [s] on two feet, or on three with the CoM outside their triangle; in
+            it the error of a trunk off balance grows fourfold, exp(t / sqrt(0.29 m / g)).
         wrench: greatest part [N] of the force that no contact forces can give for longer; of the
             moment as much on an arm of 0.2 m.
-        jolt: greatest part [N] of the force that they may not give for a moment, however little the
-            trunk lags by it, where a foot slides by more than a sixth of ``slip``: a fifth of the
+        jolt: greatest force [N] that contact forces may fail to give for a moment, however little
+            the trunk lags, where a foot slides by more than a sixth of ``slip``: a fifth of the
             weight. A fast nod that lacked 82 N, and three motions that lacked 41 to 127 N, passed
-            without this limit and went wrong; the nod fell on friction 0.35. It is not asked of
-            the first 30 ms: of 9 plans that begin at speed and lacked 100 to 500 N 8 were done.
-        lag, lag_angle: how far [m, rad] the trunk may be off its plan for what the ground cannot
-            give. In MuJoCo it was off by 0.7 to 2.2 times as much.
-        off, off_angle: how far [m, rad] the trunk may be off its plan in all, for the friction of
-            the joints too: what an author sees is 0.030 and 0.14, and MuJoCo's trunk was off by
-            1.05 to 1.3 times as much.
+            without this limit and went wrong; the nod fell on friction 0.35. The first 30 ms are
+            exempt: of 9 plans that begin at speed and lacked 100 to 500 N 8 were done.
+        lag, lag_angle: how far [m, rad] the trunk may be off its plan because of forces that the
+            ground cannot give. In MuJoCo it was off by 0.7 to 2.2 times as much.
+        off, off_angle: how far [m, rad] the trunk may be off its plan in all, joint friction
+            included: an author notices 0.030 and 0.14, and MuJoCo's trunk was off by 1.05 to 1.3
+            times as much.
         tipping: how far [m] the trunk may fall over the edge of three feet: up to 5 mm motions were
             done, from 7 on the robot fell.
-        stop: how far [m] a raised foot, or the trunk over a knee that is bent as far as it goes,
-            may be off for a joint at its stop: in MuJoCo it was off by 0.5 to 0.9 of it, and what
-            an author sees, 30 mm, must hold what it is off besides.
-        stretch: the same of the trunk over any other standing leg: it was off by 1.1 to 2.2 times
-            as much.
+        stop: how far [m] a joint at its stop may displace a raised foot, or the trunk over a fully
+            bent knee: in MuJoCo it was off by 0.5 to 0.9 of it, and the 30 mm that an author
+            notices must include other errors.
+        stretch: the same of the trunk over any other stance leg: it was off by 1.1 to 2.2 times as
+            much.
         stop_time: longest time [s] for which a trunk on three feet or four may be off by ``stop``
-            there: of random sentences that were refused for it alone all five up to 0.17 s were
+            there: of random timelines that were refused for it alone all five up to 0.17 s were
             done, from 0.22 s on half.
-        pair_hip: least distance [rad] of a standing leg's hip to its stop while no more than two
-            feet stand: the roll of a trunk that turns fast lags by 0.1 to 0.2. Of trots that roll
-            by 44 to 56 deg and kept less, nearly all went wrong, and some fell.
+        pair_hip: least distance [rad] of a stance leg's hip to its stop while no more than two feet
+            stand: the roll of a trunk that turns fast lags by 0.1 to 0.2. Of trots that roll by 44
+            to 56 deg and kept less, nearly all went wrong, and some fell.
         self_distance: least distance [m] between links that must not touch.
         clearance: least height [m] of trunk and hips: every point of their hulls. Of 17 motions
             with 11 to 20 mm, drawn for it, none touched; from 10.8 mm down the trunk was on the
             ground.
-        thigh_clearance: the same of the thighs, which come near to the ground where it sits.
-        calf_clearance: the same of the calves, which end 14 mm above the ground where they stand
-            upright, and below which the foot is: over a foot that slid by 9 mm, where 5 were
-            foreseen, some with 2.4 mm touched.
-        solved_calf_clearance: the same in solved parts, whose legs bend deeply when they push off
-            and land: with 1 mm none touched.
-        swing_depth: how deep [m] the lowest point of a foot in the air may be below the ground: it
-            stays above, so it is as much off. Down to 12 mm feet were 14 to 27 mm off in MuJoCo,
-            from 17 on more than the 30 that an author sees.
+        thigh_clearance: the same of the thighs, which come near to the ground when it sits.
+        calf_clearance: the same of the calves, which end 14 mm above the ground when they are
+            vertical, with the foot below: over a foot that slid by 9 mm, where 5 were predicted,
+            some with 2.4 mm touched.
+        solved_calf_clearance: the same in solved parts, whose legs bend deeply at push-off and
+            landing: with 1 mm none touched.
+        swing_depth: how deep [m] the lowest point of a foot in the air may be planned below the
+            ground: it stays above, so it is off by as much. Down to 12 mm feet were 14 to 27 mm off
+            in MuJoCo, from 17 on more than the 30 that an author notices.
         drag_height: height [m] of a foot's lowest point below which it is on the ground; planned
             heights are exact, so this only absorbs rounding.
-        drag: longest way [m] of a foot that counts as raised along the ground. It bears next to
-            nothing, and of 50 motions drawn for it that drag a foot by 0.02 to 0.33 m 49 were done.
-        rub: way [m] from which on that is a warning: floors are rougher than MuJoCo's.
-        landing: distance [m] by which a foot may land beside its place.
-        flat_landing: way [m] along the ground that a foot may have to go when it is 4 mm above its
-            place, if it is fast: one with 19 mm landed 18 mm beside it, one with 10 did not.
+        drag: longest distance [m] that a foot that counts as raised may move along the ground. It
+            bears next to nothing, and of 50 motions drawn for it that drag a foot by 0.02 to 0.33 m
+            49 were done.
+        rub: distance [m] from which on that is a warning: floors are rougher than MuJoCo's.
+        landing: distance [m] by which a foot may land beside its foothold.
+        flat_landing: horizontal distance [m] that a foot may still have to go when it is 4 mm above
+            its foothold, if it is fast: one with 19 mm landed 18 mm beside it, one with 10 did not.
         landing_speed: greatest speed [m/s] of a foot at touchdown: taps with 1.4 were done.
         joint_jump: greatest change [rad/s] of a joint's speed between samples of 10 ms.
-        body_jump, turn_jump: the same of the trunk's speed [m/s, rad/s]: a plan that jumps. What is
-            merely quick shows in forces, torques and slips.
+        body_jump, turn_jump: the same of the trunk's speed [m/s, rad/s]: a plan with a jump.
+            Motions that are just fast show in forces, torques and slips.
         stance_position, stance_angle: how far [m, rad] the ends may be from their postures.
         end_speed: greatest speed [m/s, rad/s] of trunk and joints at the ends.
     """

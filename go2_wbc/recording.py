@@ -85,17 +85,18 @@ class Recording:
         foot_forces: (n, 4) measured normal foot forces [N].
         stance: (n, 4) feet that the controller planned to be in contact.
         p_world_com: (n, 3) centre of mass [m].
-        support_margin: (n,) distance [m] of the CoM's ground projection to the edge of the
-            support polygon of the planned stance feet, positive inside; nan with fewer than three.
-        labels: what the robot was doing at each sample ("stand", "walk", ...), length n.
+        support_margin: (n,) distance [m] of the CoM's ground projection to the edge of the support
+            polygon of the planned stance feet, positive inside; nan with fewer than three.
+        labels: activity at each sample ("stand", "walk", ...), length n.
         robot: name of the robot's profile.
         model_file: its own MJCF or URDF, by which it is drawn; empty if it has none.
-        ground: (k, 3) middles of the cells of ground that it has seen, each as it was found last
-            [m]; none of a blind robot.
-        multipliers: (n, 48) of the limits of the whole-body QP, of each the strongest since the
-            sample (``LIMIT_ROWS`` says which); nan where it did not run. None unless the robot
-            recorded them (``go2.telemetry.explains``).
-        gave_way: (n,) whether limits contradicted each other, so that some gave way; as above.
+        ground: (k, 3) middles of the seen cells of ground [m], with the last height of each; empty
+            for a blind robot.
+        multipliers: (n, 48) of the limits of the whole-body QP (``LIMIT_ROWS`` names them), the
+            largest of each between this sample and the next; nan where no QP was solved. None
+            unless the robot recorded them (``go2.telemetry.explains``).
+        gave_way: (n,) whether limits contradicted each other, so that some were relaxed; None as
+            above.
     """
 
     time: Float[np.ndarray, " n"]

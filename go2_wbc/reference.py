@@ -165,11 +165,11 @@ class BodyTarget:
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """Everything that the whole-body controller is asked for at one instant.
+    """The input of the whole-body controller at one instant, besides the snapshot.
 
     Attributes:
         body: desired motion of the trunk.
-        legs: what each of the four legs does.
+        legs: task of each of the four legs.
         normal_force_min: least normal force [N] of each stance foot.
         normal_force_max: greatest normal force [N] of each stance foot (ramped at changes).
         p_world_feet: desired foot positions [m], used for legs in SWING.
@@ -178,11 +178,12 @@ class Reference:
         q_joints: desired joint angles [rad], used for legs in JOINTS.
         v_joints: their velocities [rad/s].
         a_joints: their accelerations [rad/s^2].
-        f_world_feet: forces [N] near which those of the stance feet are kept.
-        force_weight: by which they are, 1e-6 to 100; 0 for an even share of the robot's weight,
-            with the controller's own weight.
-        friction: greatest coefficient that the stance feet may count on; 0 for the controller's
-            own, which is never exceeded.
+        f_world_feet: desired contact forces [N] of the stance feet.
+        force_weight: weight of the force regularisation towards these, 1e-6 to 100; with 0 the
+            desired forces are an equal share of the robot's weight, with the controller's own
+            weight.
+        friction: greatest coefficient that the stance feet may use; 0 for the controller's own,
+            which is never exceeded.
         orientation_discount: the weight of the trunk's attitude is divided by 1 plus this, 0 or
             more.
         stance: feet in stance, from ``legs``.

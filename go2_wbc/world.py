@@ -32,21 +32,22 @@ RANGES = {
 @dataclass(frozen=True, slots=True)
 @ranged(**{name: between(*bounds) for name, bounds in RANGES.items()})
 class World:
-    """What a check counts on, and what a simulated robot meets.
+    """The conditions that a check assumes, or that a robot is simulated in.
 
-    The controller is told nothing of it: it works with the robot as its description has it. What is
-    uncertain stays in the range of its value.
+    The controller is not told about them: it works with the robot's description. An uncertain value
+    stays within the given share of its value.
 
     Attributes:
         friction: coefficient of feet and floor, 0.0001 to 2. Wet tiles have 0.5, dry rubber on
             concrete 1.
         friction_uncertainty: share by which it may be more or less, 0 to 0.9.
         payload: extra mass [kg] on the trunk, 0 to 12: Unitree's greatest.
-        payload_place: of its middle in the base frame [m], within 0.5 of the base's origin.
+        payload_place: position of its middle in the base frame [m], within 0.5 of the base's
+            origin.
         mass_scale: factor on the robot's mass and inertia, 0.25 to 3.
         mass_uncertainty: share by which it may be more or less, 0 to 0.5.
-        joint_friction: factor on dry friction and damping of the joints, 0 to 10; those of the
-            motors of robots differ by half (``plant.mujoco.model.JointDynamics``).
+        joint_friction: factor on dry friction and damping of the joints, 0 to 10; motors of one
+            type differ by 50 % (``plant.mujoco.model.JointDynamics``).
         joint_friction_uncertainty: share by which it may be more or less, 0 to 1.
         delay: time [s] after which a command acts, 0 to 0.05; a round trip of the robot's bus takes
             0.002. Only in simulation: the check has no equation for it.

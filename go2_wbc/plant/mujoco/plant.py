@@ -48,30 +48,30 @@ FOOT_CONTACT_THRESHOLD = 1.0
 
 
 class MujocoPlant(Plant):
-    """A robot in MuJoCo, driven by torques only; lies on the ground, folded and damped, at time 0.
+    """A robot in MuJoCo, driven by torques only; at time 0 it lies on the ground, folded, damped.
 
-    The motor law is evaluated at every physics step, and cut to what the motors give at the joints'
-    speeds then. Contact forces and torques that ``read`` reports acted over the last physics step
-    and the last control period, respectively; positions and velocities are those of this instant.
+    The motor law is evaluated at every physics step, clipped to the motors' limits at the present
+    speeds. Contact forces and torques that ``read`` reports acted over the last physics step and
+    the last control period, respectively; positions and velocities are those of this instant.
 
     Args:
-        mjcf: a user's own MJCF or scene of it; ``None`` builds the model from the URDF.
-        keyframe: name of the one of ``mjcf`` that it starts in instead of lying: its joints are
-            held there until it rests. ``GO2Controller.take_over`` goes on from a stance.
+        mjcf: a user's own MJCF or scene of the robot; ``None`` builds the model from the URDF.
+        keyframe: name of a keyframe of ``mjcf`` in which the robot starts instead of lying: its
+            joints are held there until it rests. ``GO2Controller.take_over`` goes on from a stance.
         timestep: physics step [s]; overrides the one of ``mjcf``.
         control_period: seconds per ``write``, an integer multiple of ``timestep``.
-        friction: sliding friction coefficient; ``None`` is 0.8, or what ``mjcf`` says. With
+        friction: sliding friction coefficient; ``None`` is 0.8, or the value of ``mjcf``. With
             ``mjcf`` a number applies to the feet's contacts.
-        payload: extra mass [kg], a solid box; payload_place: of its middle in the base frame [m].
-        mass_scale: factor on every mass and inertia of the robot, payload excepted.
-        terrain: the ground (``plant.terrain``), where it is not a level floor; only without
-            ``mjcf``.
-        sensors: ``"ideal"``, ``"noisy"`` for white noise on everything measured, or ``"imu"``: all
+        payload: extra mass [kg], a solid box; payload_place: position of its middle in the base
+            frame [m].
+        mass_scale: factor on every mass and inertia of the robot, without the payload.
+        terrain: the ground (``plant.terrain``) instead of a level floor; only without ``mjcf``.
+        sensors: ``"ideal"``, ``"noisy"`` for white noise on all measurements, or ``"imu"``: all
             that ``read`` gives is estimated from IMU, encoders and feet, in a world of its own.
         noise: standard deviations of ``"noisy"``.
         errors: of the sensors of ``"imu"``.
-        estimator: numbers of the estimate of ``"imu"``.
-        seed: of both and of ``initial_joint_noise``.
+        estimator: numbers of the estimator of ``"imu"``.
+        seed: of the noise, the errors and ``initial_joint_noise``.
         initial_yaw: heading at the start [rad].
         initial_joint_noise: standard deviation [rad] of the joint angles from which it settles.
         joint_dynamics: friction, damping, armature; ``None`` is the profile's, or the file's.
@@ -80,13 +80,13 @@ class MujocoPlant(Plant):
         robot: name of its profile: "go2", "a1" or "go1".
         visuals: also load the visual meshes (slower), for the viewer and for rendering.
         delay: time [s] after which a command acts, rounded to whole physics steps.
-        lidar: whether it has one, or its numbers; only without ``mjcf``.
-        depth: the same of a depth camera that looks ahead, in its place.
+        lidar: whether the robot has a lidar, or its numbers; only without ``mjcf``.
+        depth: the same for a depth camera that looks ahead, in place of the lidar.
 
     Raises:
         ClosedError: from all calls, once it is closed.
         ConfigError: for a value that is out of range.
-        ModelMismatch: if ``mjcf`` cannot be read or lacks something; names all of it.
+        ModelMismatch: if ``mjcf`` cannot be read or lacks something; lists all problems.
         DescriptionError: if the robot's files are missing or broken.
     """
 
