@@ -1,11 +1,10 @@
-"""How fast each gait may be walked, and which one to walk with by the speed: ``walk(gait="auto")``.
+"""How fast each gait may walk, and which gait to walk with at a speed: ``walk(gait="auto")``.
 
-The bounds are measured, and kept as data in ``envelopes.json``. The gaits of ``LADDER`` follow one
-another. The faster one is taken once the velocity uses ``UP`` of the envelope of the slower, and
+The bounds are measured, and stored in ``envelopes.json``. The gaits of ``LADDER`` are ordered by
+speed. The faster one is taken once the velocity uses ``UP`` of the envelope of the slower one, and
 the slower one again once velocity and command use ``DOWN`` of it at most: between the two nothing
-changes. The velocity that is followed stays inside the envelope of the gait, and for ``DWELL``
-seconds after a change inside that of the slower gait of the two, in which the phases of the feet
-pass over.
+changes. The followed velocity stays inside the envelope of the gait, and for ``DWELL`` seconds
+after a change inside that of the slower gait of the two, while the phases of the feet change.
 """
 
 from __future__ import annotations

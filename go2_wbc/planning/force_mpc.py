@@ -1,13 +1,13 @@
-"""The forces of a gait, planned ahead: from where the trunk and the feet shall go to a reference.
+"""The contact forces of a gait, planned by the MPC from the planned trunk motion and footholds.
 
-The MPC (``planning.mpc``) looks at the command as it will be ramped, at the feet that stand where
-they are, and at those that come down where their footholds are planned. Lever arms are taken from
-the measured CoM on its wanted way: taken from the reference, which may run ahead of the robot, they
-make it drift aside. One that a push throws goes on as it is thrown, and slows down: thrown to 3.7
-m/s and taken for one that trots at 0.5, it would have its next feet 0.4 m too far ahead, and be
-tipped by forces planned for these. Between two solutions the forces of the first node are kept, and
-the trunk's acceleration that the whole-body controller is given is what they make of the feet that
-stand now.
+The MPC (``planning.mpc``) uses the command as it will be ramped, the present footholds of stance
+feet, and the planned footholds of those that will land. Lever arms are taken from the measured CoM
+along its desired path: taken from the reference, which may run ahead of the robot, they make it
+drift sideways. A robot that a push has made too fast is predicted to keep its speed and slow down
+gradually. At 3.7 m/s, predicted as one that trots at 0.5, it would have its next footholds 0.4 m
+too far ahead, and be tipped by forces planned for these. Between two solutions the forces of the
+first node are kept, and the trunk's acceleration in the reference of the whole-body controller is
+what they make with the present stance feet.
 """
 
 from __future__ import annotations

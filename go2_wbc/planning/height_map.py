@@ -1,25 +1,26 @@
 """Height of the ground around the robot, cell by cell, as its scans and its feet have found it.
 
-The map is a ring of ``CELLS`` x ``CELLS`` cells, aligned with the axes of the frame in which the
-robot's place is estimated: the cell (i, j) lies in row i mod ``CELLS`` and column j mod ``CELLS``,
-and names itself there. What was left behind is so overwritten by what comes, and nothing is moved.
+The map is a circular buffer of ``CELLS`` x ``CELLS`` cells, aligned with the axes of the frame in
+which the robot's pose is estimated: the cell (i, j) lies in row i mod ``CELLS`` and column j mod
+``CELLS``, and stores its index there. So new cells overwrite those left behind, and nothing is
+moved.
 
 Each scan measures a cell by the mean z of its points that lie at most ``LAYER`` below its highest,
 with the variance r = sigma^2 / n. While z is within ``JUMP`` of the height h with its variance P,
-one step of a Kalman filter of a height that drifts takes it in (Fankhauser et al., Probabilistic
+one step of a Kalman filter of a drifting height takes it in (Fankhauser et al., Probabilistic
 Terrain Mapping for Mobile Robots With Uncertain Localization, RA-L 2018):
 
     P <- P + q,    k = P / (P + r),    h <- h + k (z - h),    P <- (1 - k) P
 
-A cell that is found higher than that is believed at once, one that is lower after ``DOWNS`` scans
-in a row: what a foot would hit must not be missed, and a point that slips past an edge is no pit.
+A higher measurement replaces h at once, a lower one after ``DOWNS`` scans in a row: an obstacle for
+a foot must not be missed, and a point that slips past an edge is no pit.
 
-The height that the robot believes to have drifts; its feet know better. The mean distance of the
-feet that stand from the map below them moves the whole map:
+The estimated height of the robot drifts; its stance feet measure the drift. Their mean distance
+from the map below them shifts the whole map:
 
     s' = RATE mean(z_foot - r_foot + compression - h - s)
 
-Where nothing is known yet a foot that stands writes what it has found.
+Where nothing is known yet, a stance foot writes the height that it has found.
 """
 
 from __future__ import annotations

@@ -61,20 +61,21 @@ class MpcConfig:
     """Numbers of the MPC, from a search on this robot in simulation.
 
     Attributes:
-        angle_weights, position_weights: of the turn [1/rad^2] and the CoM's place [1/m^2].
+        angle_weights, position_weights: of the rotation [1/rad^2] and the CoM's position [1/m^2].
         angular_weights, linear_weights: of their rates [s^2/rad^2], [s^2/m^2].
         force_weight: of a force [1/N^2]; above 0, or the forces are not unique.
         friction: mu of the friction pyramid.
-        force_max: greatest normal force [N] of a foot, while it stands.
+        force_max: greatest normal force [N] of a stance foot.
         least_share: part of a node below which a foot counts as in the air.
-        prior_weight: by which the whole-body controller keeps to the forces.
-        load_ramp: time [s] over which a foot may take up the force after touchdown and give it up
+        prior_weight: weight with which the whole-body QP tracks the planned forces.
+        load_ramp: time [s] over which a foot takes up its force after touchdown and gives it up
             before lift-off.
-        throw_time: time constant [s] with which a robot that has been thrown is taken to slow down.
-        throw_speed: speed [m/s] of such a robot, beyond ``LocomotionConfig.stride_margin``, at
-            which the trunk's attitude weighs half as much in the whole-body QP. With all its weight
-            and the feet far from below the CoM, the legs in the air are swung to turn the trunk:
-            feet that should have come down were 0.16 m high, and the robot fell onto them.
+        throw_time: time constant [s] with which a robot that a push has made too fast is assumed to
+            slow down.
+        throw_speed: excess speed [m/s] of such a robot, beyond ``LocomotionConfig.stride_margin``,
+            at which the weight of the trunk's attitude in the whole-body QP is halved. With the
+            full weight and the feet far from below the CoM, the legs in the air are swung to turn
+            the trunk: feet that should have landed were 0.16 m high, and the robot fell onto them.
     """
 
     angle_weights: tuple[float, float, float] = (20.0, 20.0, 20.0)

@@ -1,18 +1,20 @@
 """How a walk comes to rest: when it may stop stepping, on which feet, where the trunk goes then.
 
 A step helps as long as it brings the feet nearer to below their hips. On some robots it does not:
-with the dry friction of other people's joints, with much damping or late commands the same two
-feet come down 20 to 28 mm beside their places again and again, and a robot that waits for a square
-marches for ever. So after a few landings without a command any stance will do that holds it:
+with other joint friction, high damping or late commands the same two feet land 20 to 28 mm beside
+their footholds again and again, and a robot that waits for a square stance steps for ever. So after
+a few landings without a command any stance is accepted that holds the robot:
 
 - its feet are within reach of their hips, and with them the joints within their limits;
-- the capture point (Pratt et al., Capture Point, Humanoids 2006), ``p + v / omega`` with ``omega =
-  sqrt(g / h)``, lies well inside the feet's polygon: there the robot comes to rest over it.
+- the capture point (Pratt et al., Capture Point, Humanoids 2006), ``p + v / omega`` with
+  ``omega = sqrt(g / h)``, lies well inside the support polygon: there the robot comes to rest over
+  it.
 
-Where it comes to rest by itself is where it is wanted at first. The reference may be elsewhere, by
-the leash at most, and is gone to slowly, as far as the feet allow: followed at once it made a robot
-that had just said that it rests move at 40 mm/s. What is wanted stays with the feet, which stand:
-an estimate that learns, 0.3 s after the last step, that the robot rests may move it by 9 mm.
+At first the trunk's target is where it comes to rest by itself. The reference may be elsewhere, by
+the leash at most, and is approached slowly, as far as the feet allow: followed at once it made a
+robot that had just reported to rest move at 40 mm/s. The target stays fixed relative to the stance
+feet: the estimator, which learns 0.3 s after the last step that the robot rests, may move it by 9
+mm.
 """
 
 from __future__ import annotations

@@ -1,20 +1,20 @@
-"""What a walk makes of the height map: the plane below the trunk, its speed, and where it stops.
+"""What a walk takes from the height map: the plane below the trunk, its speed, and where it stops.
 
 The plane z = h + s (p - p_com) fits, by least squares, the known ground from ``BEHIND`` to
-``AHEAD`` of the CoM and ``ASIDE``, and with ``LANDING_WEIGHT`` where each foot was met last. Pits
-and walls, which no foot stands on, are left out. It is fitted anew, and the way looked along, every
-``AGAIN`` seconds. What the trunk follows comes near to it with the time constant ``SMOOTH_TIME``.
-Going up, the trunk is pitched as the plane is; going down it is carried higher, where the calves
-pass over the edges behind their feet.
+``AHEAD`` of the CoM and ``ASIDE``, and with ``LANDING_WEIGHT`` the last foothold of each foot. Pits
+and walls, on which no foot stands, are left out. The plane is fitted, and the path ahead checked,
+every ``AGAIN`` seconds. The trunk approaches the plane with the time constant ``SMOOTH_TIME``.
+Uphill, the trunk has the pitch of the plane; downhill it is higher, so that the calves clear the
+edges behind their feet.
 
 Where the ground has steps of more than ``UNEVEN`` the feet are placed and swung by the map
 (``sighted_steps``), at ``SPEED`` and with ``gait_clock.SEEN_STRIDE``.
 
-Along three lines, of the feet and of the middle, a foot is walked ahead over the map: from the last
-place where it could stand, ``FOOT_CELLS`` in a row that are even, at height h, it goes on to the
-next one with |z - h| <= ``GREATEST_STEP``. A cell that is higher ends the way, and so does a hole
-longer than ``GREATEST_GAP``. The speed towards that end, d from the CoM, is at most sqrt(2 a (d -
-d_stop)); at d_stop the robot has stopped.
+Along three lines, of the feet and of the middle, possible footholds are followed ahead over the
+map: from the last place where a foot could stand, ``FOOT_CELLS`` even cells in a row, at height h,
+to the next one with |z - h| <= ``GREATEST_STEP``. A cell that is higher ends the path, and so does
+a hole longer than ``GREATEST_GAP``. The speed towards that end, d from the CoM, is at most sqrt(2 a
+(d - d_stop)); at d_stop the robot has stopped.
 """
 
 from __future__ import annotations

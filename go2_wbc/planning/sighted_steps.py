@@ -1,7 +1,7 @@
-"""Where feet are put down, and how they get there, on ground that the robot has seen.
+"""Footholds and swings on ground that the robot has seen.
 
-A foothold is the cell near to where the foot would be put down blindly (``footholds``), at a
-distance d, that costs least:
+A foothold is the cell near the blind robot's foothold (``footholds``), at a distance d from it,
+that costs least:
 
     (d / FAR)^2 + EDGE edge + (range / FLAT)^2 + UNKNOWN [not known] + STICKY (way / FAR)^2
         + MISS sum of how far, at touchdown, in the middle and at the end of its stance, the calf
@@ -9,21 +9,21 @@ distance d, that costs least:
         + LOWERING sum of how far the back of the calf does so, EARLIER, with the foot a third and
         two thirds of the way down to a lower place above it
 
-``way`` is that from where the foot is led at present: what the trunk's velocity does within a
-stride must not send it to and fro. ``edge`` falls, as a square, through 1 at ``NEAR`` to 0 at
-``NEAR_ENOUGH`` from the next cell that is lower by more than ``STEP``, or unknown, or a little
-nearer if it is higher; ``range`` is that of the heights of the cells around it. It is chosen anew
-until ``LATEST`` of the swing, and gone over to at ``SLEW``; later only its height follows. The last
-term keeps a foot on top of a high step until its hip has gone on: a hip 7 cm past the edge bends
-the knee so far that the calf comes down on it, and the foot hangs in the air. The place that was
-chosen last may always be kept: the blind one swings aside with the trunk by 8 cm, and would drag it
-over an edge.
+``way`` is the distance from the foothold to which the foot swings at present: changes of the
+trunk's velocity within a stride must not move it to and fro. ``edge`` falls, as a square, through 1
+at ``NEAR`` to 0 at ``NEAR_ENOUGH`` from the next cell that is lower by more than ``STEP``, or
+unknown, or a little nearer if it is higher; ``range`` is that of the heights of the cells around
+it. The foothold is chosen anew until ``LATEST`` of the swing, and approached at ``SLEW``; later
+only its height is updated. The last term keeps a foot on top of a high step until its hip has gone
+on: a hip 7 cm past the edge bends the knee so far that the calf hits the edge, and the foot hangs
+in the air. The foothold chosen last may always be kept: the blind one moves sideways with the trunk
+by 8 cm, and would drag it over an edge.
 
-The swing goes up to a top over both of its ends and all that is between, and down; each part's time
-is by its height. It goes ahead between two moments, which are the nearest to the swing's begin and
-to ``LANDED``, from which on the foot may touch, between which it keeps ``OVER`` from what it
-passes. So the foot rises in front of a step, and goes ahead over the edge behind it before it comes
-down; on the level it goes ahead all the time.
+The swing rises to an apex above both of its ends and the ground between them, and descends; each
+part's time is in proportion to its height. The foot moves ahead between two instants, which are the
+nearest to the swing's begin and to ``LANDED``, from which on the foot may touch, between which it
+clears the ground by ``OVER``. So the foot rises in front of a step, and moves ahead over the edge
+behind it before it descends; on the level it moves ahead all the time.
 """
 
 from __future__ import annotations

@@ -1,28 +1,28 @@
-"""The trunk's way: the command ramped, integrated to a pose and kept near the robot.
+"""The trunk's reference: the command ramped, integrated to a pose and kept near the robot.
 
 The velocity is in the heading frame (z up, x along the reference's yaw); the heading is integrated
-first and turns it. A body that only followed a velocity would keep a steady error of place and
-heading, so the command is integrated to a pose, which is held within reach (a leash) of the
-measured one: a robot that is held does not store up a way to jump afterwards.
+first and turns it. A body that only followed a velocity would keep a steady error of position and
+heading, so the command is integrated to a pose, which is kept within a limit (a leash) of the
+measured one: a robot that is held back does not accumulate an error, to jump afterwards.
 
-A ``BodyPose`` that is asked for comes on top of a trunk that walks: level along the ground, at the
-walking height, facing the heading. The heading stays that of the command and of the feet, so that a
-trunk with yaw looks aside while it walks ahead. A new pose is approached without a jump of its
-rates: each is ``sharpness`` times what is missing, within a greatest rate, and changes by
+A ``BodyPose`` is added to the pose of a walking trunk: level along the ground, at the walking
+height, facing the heading. The heading stays that of the command and of the feet, so that a trunk
+with yaw looks aside while it walks ahead. A new pose is approached without a jump of its rates:
+each is ``sharpness`` times the remaining error, within a greatest rate, and changes by
 ``sharpness`` times that in a second at most, which is as fast as it must fall at the end, so that
 nothing overshoots.
 
-What sags under a load, and the lean that the joints' friction leaves, are integrated and taken out:
-a task of the whole-body QP is a proportional-derivative law, whose error then settles at a value
-that is not zero. Per axis in the world
+Sag under a load, and lean by joint friction, are removed by an integral: a task of the whole-body
+QP is a proportional-derivative law, whose error then settles at a value that is not zero. Per axis
+in the world
 
     o' = rate * clip(e, -window, window);   |o| <= limit
 
-is added to the reference, so that the measured body settles where it was asked to be. The window
-bounds how fast that grows. An error beyond it still counts: a body that a load or dry friction
-holds far off would otherwise stay there for good. The limit bounds what is stored up (anti-windup
-by saturation: Astrom & Hagglund, PID Controllers, 1995, sec. 3.5), for instance while the body is
-on its way, or by a contact that gives way.
+is added to the reference, so that the measured body settles at its target. The window bounds how
+fast the integral grows. An error beyond it still counts: a body that a load or dry friction holds
+far off would otherwise stay there for good. The limit is an anti-windup by saturation (Astrom &
+Hagglund, PID Controllers, 1995, sec. 3.5), for instance while the body is on its way, or against a
+contact that gives way.
 """
 
 from __future__ import annotations
@@ -90,10 +90,10 @@ LEVEL = BodyPose()  #: The pose of a robot that walks and is asked for nothing e
 @dataclass(frozen=True, slots=True)
 @ranged(highest=NOT_NEGATIVE, roll=NOT_NEGATIVE, pitch=NOT_NEGATIVE, yaw=NOT_NEGATIVE)
 class PoseEnvelope:
-    """Poses that are held while the robot walks, each with all others at their bounds.
+    """Limits of the trunk's pose while the robot walks, each measured with all others at theirs.
 
     Attributes:
-        lowest, highest: heights, from the walking height [m]; 0 lies between.
+        lowest, highest: heights, relative to the walking height [m]; 0 lies between.
         roll, pitch, yaw: angles either way [rad].
     """
 
@@ -130,12 +130,12 @@ class PoseEnvelope:
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE)
 class PoseConfig:
-    """How a new pose is approached (own choice: about a second for what is allowed).
+    """How a new pose is approached (own choice: about a second for any allowed pose).
 
     Attributes:
         height_rate: greatest rate of the height [m/s].
         turning_rate: greatest rate of roll, pitch and yaw [rad/s].
-        sharpness: share of what is missing that is made up in a second, near the end [1/s].
+        sharpness: rate [1/s] at which the remaining error decays near the end.
     """
 
     height_rate: float = 0.10

@@ -66,29 +66,30 @@ class LocomotionConfig:
 
     Attributes:
         height: CoM height [m] above the ground.
-        compression: by which feet under the trunk's weight are pressed flat, or into the ground,
+        compression: by which feet are compressed, or sink into the ground, under the trunk's weight
             [m]: in MuJoCo 1 to 6 mm, by the friction of the joints.
         linear_acceleration: greatest change of the commanded velocity [m/s^2], where the ground
-            bears it and the commands act at once; else as much less as ``ground.haste`` says.
+            bears it and commands act at once; else reduced by ``ground.haste``.
         angular_acceleration: greatest change of the commanded turning rate [rad/s^2].
         velocity_feedback: foothold offset [s] per velocity error.
-        stride_margin: speed [m/s] that the robot may have beyond the commanded one before the
-            stride follows it. A push of 50 N s throws it to 3.4 m/s: on a foot that stands as long
-            as at 0.5 m/s the trunk then travels half a metre, and falls.
+        stride_margin: speed [m/s] beyond the commanded one from which on the stride follows the
+            measured speed. A push of 50 N s makes the robot 3.4 m/s fast: with the stance time of
+            0.5 m/s the trunk then travels half a metre, and falls.
         position_leash: distance [m] that the reference may run ahead of the robot.
         yaw_leash: angle [rad] that the heading reference may run ahead.
         foothold_reach: greatest horizontal distance [m] of a foothold from below its hip.
-        normal_force_min: least normal force [N] asked of a stance foot.
+        normal_force_min: least normal force [N] required of a stance foot.
         normal_force_max: greatest normal force [N] allowed on a stance foot.
         settle_speed: speed [m/s] below which a robot without command may stop stepping.
-        capture_margin: distance [m] of the capture point from the middle of the feet beyond
-            which a standing robot starts to step.
+        capture_margin: distance [m] of the capture point from the middle of the feet beyond which a
+            standing robot starts to step.
         square_tolerance: distance [m] of a foot from below its hip at which the robot stands
             squarely enough to stop stepping.
-        ground_friction: of the ground until the robot has walked on it; feet that slide, and feet
-            that do not, change what is believed, and the next walk begins with that.
+        ground_friction: assumed coefficient of the ground until the robot has walked on it.
+            Walking, with and without slip, updates the estimate, and the next walk begins with
+            that.
         swing: shape of the swing.
-        mpc: planning of the forces ahead.
+        mpc: the MPC of the contact forces.
         pose: how a new pose of the trunk is approached.
         rough: how it walks on rough ground.
     """

@@ -1,7 +1,8 @@
 """What a leg tells the state estimator: where its foot is, how fast the trunk, how high the ground.
 
-With s_i the place of the foot's centre from the IMU along the world's axes by the leg's kinematics,
-and m_i the velocity that the IMU has if the foot rolls (innovation and h as in ``state_filter``):
+With s_i the position of the foot's centre from the IMU along the world's axes by the leg's
+kinematics, and m_i the velocity of the IMU if the foot rolls (innovation and h as in
+``state_filter``):
 
     place      s_i - (f_i - p) = df_i - dp - theta x s_i     r = place^2
     velocity   m_i - v = dv - theta x v                      r = k ((velocity / trust)^2 + slip^2
@@ -9,19 +10,19 @@ and m_i the velocity that the IMU has if the foot rolls (innovation and h as in 
     height     level - g_i = df_i,z                          r = height^2, once after touchdown
     slope      plane - g_i = df_i,z                          r = (print^2 + d^2) (1 + leverage)
 
-A turn of the estimate turns a leg's velocity with it, by theta x v. trust grows from 0 to 1 between
-``contact_force`` and ``trusted_force``, slip decays after touchdown, creep grows with the foot's
-speed along the trunk, vertically ``vertical`` is added, and k is ``slip_factor``. A foot drifts by
-a speed of its own, which is its part of Q. g_i is the height of the ground where the foot met it,
-before it sank in: known to 3 mm, be it on the level, on stairs or on blocks. The level is what is
-known of the ground there, see ``height_off``: shoes with an IMU know their height the same way
-(Park & Suh, *Height compensation using ground inclination estimation*, Sensors 11, 2011).
+A rotation of the estimate rotates a leg's velocity with it, by theta x v. trust grows from 0 to 1
+between ``contact_force`` and ``trusted_force``, slip decays after touchdown, creep grows with the
+foot's speed along the trunk, vertically ``vertical`` is added, and k is ``slip_factor``. The drift
+speed of a foot gives its part of Q. g_i is the height of the ground at the foot's touchdown, before
+it sank in: known to 3 mm, be it on the level, on stairs or on blocks. The level is the known height
+of the ground there, see ``height_off``: foot-mounted IMUs get their height the same way (Park &
+Suh, *Height compensation using ground inclination estimation*, Sensors 11, 2011).
 
-Where the ground is in no levels, a plane is laid through where feet came down near by, off which
-these are by d (``footprints``). Its normal n is the one about which a foot rolls there, while it
-creeps downhill: its centre moves with w_i x (r n) + creep (n_z n - e_z). The height is taken from
-the prints of the other end's feet: they were made when the trunk was elsewhere, and a drift since
-shows. What moves the estimate along a plane does not show.
+Where the ground has no levels, a plane is fitted to the footholds near by, which deviate from it by
+d (``footprints``). Its normal n is the one about which a foot rolls there, while it creeps
+downhill: its centre moves with w_i x (r n) + creep (n_z n - e_z). The height of a front foot is
+taken from the footholds of the hind feet, and the other way round: these were made when the trunk
+was elsewhere, so the innovation shows the drift since. Drift along the plane cannot be seen.
 """
 
 from __future__ import annotations

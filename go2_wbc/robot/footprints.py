@@ -1,13 +1,13 @@
-"""The ground about a place, by the places where feet came down: a plane by weighted least squares.
+"""The ground about a place, from the last footholds: a plane by weighted least squares.
 
 Locally weighted regression (Cleveland, J. American Statistical Association 74, 1979): with the
-prints p_k at (x_k, y_k) from the place, w_k = exp(-(x_k^2 + y_k^2) / (2 reach^2)), W their sum, m
-their weighted mean and C = sum w_k (p_k - m)(p_k - m)',
+footholds p_k at (x_k, y_k) from the place, w_k = exp(-(x_k^2 + y_k^2) / (2 reach^2)), W their sum,
+m their weighted mean and C = sum w_k (p_k - m)(p_k - m)',
 
     slopes     (s_x, s_y) = (C_xy + ridge 1)^-1 C_z
     height     m_z - s_x m_x - s_y m_y
-    deviation  sqrt((C_zz - s_x C_xz - s_y C_yz) / W)     of the prints from the plane
-    leverage   1 / W + m' (C_xy + ridge 1)^-1 m           above 1 / W, the more so beyond the prints
+    deviation  sqrt((C_zz - s_x C_xz - s_y C_yz) / W)     of the footholds from the plane
+    leverage   1 / W + m' (C_xy + ridge 1)^-1 m           above 1 / W, the more so beyond them
 
 C_xy being the 2 x 2 part of C, and C_z its parts with z.
 """

@@ -1,20 +1,20 @@
 """How late commands act, and where the robot will be when the next one does.
 
-A command that is given now acts ``d`` control periods later. What the motors are measured to give
-is what was asked of them ``d + 1`` ticks before, so ``d`` is the lag at which the two differ least:
+A command that is given now acts ``d`` control periods later. The measured torques of the motors are
+those commanded ``d + 1`` ticks before, so ``d`` is the lag at which the two differ least:
 
     e_d' = (|tau - tau_asked[d]|^2 - e_d) / T,      d = argmin e_d
 
 As long as torques hardly change all lags fit alike and the last one found stays: another must fit
-better by a share of how much the torques themselves have changed. Nor do motors tell of any that do
-something else.
+better by a share of how much the torques themselves have changed. Motors that do not follow their
+commands tell no lag.
 
-What the whole-body controller has asked for and what has not acted yet, it has also foretold: its
-accelerations. The state is carried on by them, v_i+1 = v_i + dt a_i, and the next torques are found
-for the robot as it will be then (Smith, Closer control of loops with dead time, 1957, with the
-model of the QP for the plant). On the flat a trot on a friction of 0.3 or less fell within a second
-with 10 ms, as one on 0.6 did with 20. Commands that act at once leave the state as it is, bit by
-bit.
+For the commands that have not acted yet, the whole-body controller has also predicted the
+accelerations. The state is propagated by them, v_i+1 = v_i + dt a_i, and the next torques are
+computed for the robot as it will be then (Smith, Closer control of loops with dead time, 1957, with
+the model of the QP for the plant). On the flat a trot on a friction of 0.3 or less fell within a
+second with 10 ms, as one on 0.6 did with 20. Commands that act at once leave the state as it is,
+bit by bit.
 """
 
 from __future__ import annotations

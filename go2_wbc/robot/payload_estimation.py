@@ -50,31 +50,31 @@ NOTHING = 0.02  #: Mass [kg] at which a belief that fades has ended
 class PayloadConfig:
     """Numbers of the estimate of the payload.
 
-    The thresholds lie above what a robot without payload showed in simulation, with all masses
-    10 % wrong, in every gait, on its sensors too: 1.9 kg, 0.06 kg m ahead and 0.04 aside. On joints
-    with twice the friction, or that of other models of a Go2, it was 3.8 kg, 0.18 and 0.04 kg m; on
-    slopes of 15 deg 0.18 and 0.14 kg m.
+    The thresholds lie above what was estimated of a robot without payload in simulation, with all
+    masses 10 % wrong, in every gait, also on its sensors: 1.9 kg, 0.06 kg m ahead and 0.04 aside.
+    On joints with twice the friction, or that of other models of a Go2, it was 3.8 kg, 0.18 and
+    0.04 kg m; on slopes of 15 deg 0.18 and 0.14 kg m.
 
     Attributes:
-        enabled: whether there is one. The back end "placo", which has a robot of its own, does
-            without it.
+        enabled: whether a payload is estimated. The back end "placo", which has a robot of its own,
+            does not use the estimate.
         memory: time constant [s] of the means.
-        response: time constant [s] by which the belief follows what is felt.
-        centred_mass: mass [kg] from which on a payload is believed wherever it lies.
-        least_mass: mass [kg] from which on one that lies beside the middle is.
+        response: time constant [s] with which the estimate in use follows the measured one.
+        centred_mass: mass [kg] from which on a payload counts wherever it lies.
+        least_mass: mass [kg] from which on one that lies beside the middle counts.
         least_moment: first moment [kg m] about the middle, ahead and aside, from which on it does.
-        patience: time [s] for which it must be felt before it is believed: what the trunk or a leg
-            strikes is soon past.
-        release: share of the thresholds below which it is believed no longer.
-        most_mass: greatest mass [kg] that is believed.
-        reach: greatest distance [m] from the middle that is believed, ahead and aside.
+        patience: time [s] for which it must be measured before it counts: impacts on the trunk or a
+            leg are shorter.
+        release: share of the thresholds below which it no longer counts.
+        most_mass: greatest mass [kg] of the estimate.
+        reach: greatest distance [m] of the estimate from the middle, ahead and aside.
         middle: own CoM of the standing robot in the base frame [m].
         base_height: of the base's origin over the ground, standing [m].
         least_height: of the base over the lowest foot, below which the belly may carry [m].
-        most_rise: vertical speed [m/s] of the CoM beyond which nothing is felt: friction in the
-            joints of a rising robot looks like a load.
-        most_speed: of the base, ahead and aside [m/s]: beyond them it looks like one that lies
-            ahead, or aside.
+        most_rise: vertical speed [m/s] of the CoM beyond which nothing is estimated: friction in
+            the joints of a rising robot looks like a load.
+        most_speed: of the base, ahead and aside [m/s]: beyond it friction looks like a load that
+            lies ahead, or aside.
     """
 
     enabled: bool = True

@@ -1,9 +1,10 @@
-"""Whether a robot rests, lies or has tumbled, or its estimate is lost, by what its sensors read.
+"""Whether a robot rests, lies or has tumbled, or its estimate is lost, by its sensor readings.
 
-At rest are joints that do not move and an IMU that feels gravity alone and does not turn. One that
-lies is told from one in flight by the gravity that its trunk feels, beyond what the IMU of a
-turning one feels beside the CoM. Each has to last: see ``EstimatorConfig``. To the filter
-(``state_filter``) rest is a measurement of the velocity, and lying one of the gyro's bias, too.
+At rest the joints do not move, and the IMU measures gravity alone and no rotation. A lying robot is
+told from one in flight by the gravity that its trunk measures, beyond the centripetal acceleration
+that the IMU of a rotating robot measures beside the CoM. Each has to last: see ``EstimatorConfig``.
+To the filter (``state_filter``) rest is a measurement of the velocity, and lying at rest one of the
+gyro's bias, too.
 """
 
 from __future__ import annotations

@@ -71,25 +71,25 @@ class SafetyConfig:
         tilt_limit: tilt [rad] of the trunk beyond which a balancing robot counts as fallen, also
             where a motion wants it; rearing by 59 deg is done.
         astray_tilt_limit: the same for a robot that leans by half of ``lean_limit`` or more from
-            how it shall be, or that may lie. A thrown one may be at 60 deg for a moment only, and
-            its sensors off by a degree.
+            its reference, or that may lie. After a push a robot may be at 60 deg for a moment only,
+            and its sensors off by a degree.
         height_limit: height [m] of the base over the centre of the lowest foot below which a
             balancing robot counts as collapsed; on its belly it is 0.063.
         touch_limit: time [s] for which the trunk of a balancing robot may touch the ground, or
-            bounce off it, deeper than half of ``sink_limit`` or leaning by more than half of
-            ``lean_limit``, after more than a graze; of the robots that withstood a push in
-            simulation hardly one did.
-        sink_limit: depth [m] of the trunk below where it shall be, beyond which it has sunk; in
+            bounce off it, while it has sunk by more than half of ``sink_limit`` or leans by more
+            than half of ``lean_limit``, except for a graze; hardly any robot that withstood a push
+            in simulation did.
+        sink_limit: depth [m] of the trunk below its reference beyond which it has sunk; in
             simulation 0.01 at most in every motion, 0.07 with a payload of 8 kg.
         sink_limit_time: time [s] for which it may; after pushes that a trot withstood 0.16 at most.
-        lean_limit: angle [rad] between the trunk's attitude and the wanted one, heading left out,
-            beyond which it leans away; in simulation 0.10 at most in every motion, 0.16 after
-            pushes that the robot withstood, 1.0 at rest on a limb.
+        lean_limit: angle [rad] between the trunk's attitude and its reference, without heading,
+            beyond which it leans; in simulation 0.10 at most in every motion, 0.16 after pushes
+            that the robot withstood, 1.0 at rest on a limb.
         lean_limit_time: time [s] for which it may.
         stale_limit: time [s] without news from the plant after which it counts as silent.
         qp_patience: QP failures in a row after which the robot is damped for good.
-        grave_limit_time: time [s] for which its constraints may give way by more than
-            ``wbc.solvers.LIMITS`` before it is damped for good; after pushes that a trot
+        grave_limit_time: time [s] for which constraints may be violated by more than
+            ``wbc.solvers.LIMITS`` before the robot is damped for good; after pushes that a trot
             withstood 0.036 at most (a hip at its stop).
     """
 

@@ -1,16 +1,17 @@
 """Which sensor is broken, by what the others say, and what it should have read.
 
-Every reading passes here before the estimator. One that contradicts the others for a while is
-named, and put right where they tell what it should have been. The residuals:
+Every reading passes here before the estimator. A sensor that contradicts the others for a while is
+named, and corrected if they determine its value. The residuals:
 
-    encoder jumps    q - q_last - v dt                            the jump is taken off from then on
+    encoder jumps    q - q_last - v dt                            the jump is subtracted afterwards
     encoder stuck    q and v stay while the leg's others do not   nothing replaces it
     foot's force     against f = -J^-T (tau - M dv/dt)            replaced by f
-    IMU              against feet that stand: ``imu_watch``       the error is taken off
-    noise            of speeds and gyro: ``speed_noise``          what angles and time say
+    IMU              against feet that stand: ``imu_watch``       the error is subtracted
+    noise            of speeds and gyro: ``speed_noise``          from angles and time
 
 with J and M of a leg alone, in the base frame. Forces are judged while the legs carry the robot. A
-reading that is not a number is taken for the one before. Sound ones leave as they came, bit by bit.
+reading that is not a number is replaced by the previous one. Sound readings are passed on
+unchanged, to the bit.
 """
 
 from __future__ import annotations

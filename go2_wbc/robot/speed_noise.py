@@ -1,10 +1,10 @@
-"""Joints' speeds and the gyro where they are mostly noise: what angles and time say instead.
+"""Replaces joint speeds and the gyro where they are mostly noise, by angles and time.
 
     speeds   e = (q - q_1) / dt - (v + v_1) / 2    noisy: v = (q - q_1) / dt
     gyro     e = (w - 2 w_1 + w_2) / sqrt(6)       noisy: w' = (w_read - w) / T
 
-e is 0 for what turns smoothly, and as large as the noise, or 0.7 times that of the speeds. Noisy is
-what e is in the mean square. Readings that are not leave as they came, to the bit.
+e is 0 for smooth motion, and as large as the noise, or 0.7 times that of the speeds. A signal is
+noisy if the mean square of e is large. Other readings are passed on unchanged, to the bit.
 """
 
 from __future__ import annotations

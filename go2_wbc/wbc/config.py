@@ -51,21 +51,21 @@ class Gains:
 @dataclass(frozen=True, slots=True)
 @ranged(WEIGHT, limit_horizon=POSITIVE, friction=between(*RANGES["friction"]))
 class DynamicWbcConfig:
-    """What is different for plans with flights or few feet; tuned on five seeds in simulation.
+    """Replacements for plans with flight phases or one or two stance feet, tuned on five seeds.
 
     Attributes:
-        position_weight, orientation_weight: task weights. On two feet the force that moves the
-            body also turns it. A trunk whose attitude is kept falls over its feet: the CoM of a
-            rear-up of 25 deg is 110 mm off at the end of it with 10 and 10. With these the robot
-            ends 10 mm off; with 300 the attitude is 6 deg off on the average.
-        swing_weight: task weight. In flight the trunk is turned by the legs only: with the usual
-            weight, which keeps its attitude, feet are 50 mm off their places when they land, the
-            robot lands twice as far off, and motors give all they have for 2 to 6 times as long.
-        limit_horizon: time [s] in which a joint-limit bound must be met. In 0.02 s the knees may
+        position_weight, orientation_weight: task weights. On two feet the force that moves the body
+            also turns it. If the attitude is kept, the trunk falls over its feet: with 10 and 10
+            the CoM of a rear-up of 25 deg is 110 mm off at its end. With these weights the robot
+            ends 10 mm off; with 300 the attitude is 6 deg off on average.
+        swing_weight: task weight. In flight only the legs turn the trunk: with the usual weight,
+            which keeps its attitude, feet are 50 mm off their footholds when they land, the robot
+            lands twice as far off, and motors are saturated for 2 to 6 times as long.
+        limit_horizon: time [s] in which a joint-limit bound must be met. With 0.02 s the knees may
             not speed up as fast as a jump needs, which costs a quarter of its height.
         friction: mu of the cone of planned forces, and of the pyramid of others: 5 % less than the
-            floor of 0.5 that such plans are solved for, since feedback comes on top of their
-            forces. With 0.6, feet that land slid up to 30 mm on that floor.
+            floor of 0.5 that such plans are solved for, to leave a margin for feedback. With 0.6,
+            landing feet slid up to 30 mm on that floor.
     """
 
     position_weight: float = 150.0
@@ -102,13 +102,13 @@ class WbcConfig:
         body_position: CoM or base, world axes.
         body_orientation: base, base axes.
         swing_foot: Cartesian swing.
-        leg_posture: joint-space legs. With (400, 36) the friction of their joints holds a paw that
-            skims the ground 16 mm beside its place, a stamp from 0.3 m 30 mm; now 11 and 13.
+        leg_posture: joint-space legs. With (400, 36) joint friction holds a paw close to the ground
+            16 mm off its position, a stamp from 0.3 m 30 mm; now 11 and 13.
         position_weight, orientation_weight, swing_weight, posture_weight: task weights, 1e-3 to
             1e3; the first two may be 0, but a leg in the air needs a goal.
-        flight_weight: greatest weight of the orientation while no foot stands, 1e-3 to 1e3. Only
-            the legs turn the trunk then. With its usual weight, feet that swung forward at 3.3 m/s
-            landed 0.1 m behind their footholds, and the robot fell over them.
+        flight_weight: greatest weight of the orientation in flight, 1e-3 to 1e3. Only the legs turn
+            the trunk then. With its usual weight, feet that swung forward at 3.3 m/s landed 0.1 m
+            behind their footholds, and the robot fell over them.
         force_weight: of the force regularisation, 1e-6 to 100, or accuracy is lost.
         friction: mu of the friction pyramid.
         keeps_cone: whether a foot with a planned force keeps within the cone of ``friction``, where
@@ -116,12 +116,12 @@ class WbcConfig:
             little load after a landing slid 15 mm.
         torque_share: share of the motors' torque that may be used, at every speed.
         speed_share: share of the URDF's joint speed limit that may be used.
-        stance_damping: [1/s] on the velocity of stance contact points.
-        braking: joint deceleration [rad/s^2] that the limits count on.
+        stance_damping: damping rate [1/s] of the velocity of stance contact points.
+        braking: joint deceleration [rad/s^2] that the joint limits assume.
         limit_horizon: time [s] in which a joint-limit bound must be met.
         joint_margin: distance [rad] that the joints keep from their position limits.
         joint_friction: friction of the joints, fed forward.
-        dynamic: what is different for plans with flights or few feet.
+        dynamic: replacements for plans with flight phases or one or two stance feet.
     """
 
     solver: str = "active_set"

@@ -1,4 +1,4 @@
-"""What it costs that feet that shall stand, but move, are stopped: multipliers of their contacts.
+"""The price of stopping stance feet that move: the multipliers of their contacts.
 
 With the slope s of cost and limits in the accelerations, the multipliers m of the base's rows and l
 of a stance leg's contact, in the blocks and with the numbers of ``condensed``,
@@ -6,8 +6,8 @@ of a stance leg's contact, in the blocks and with the numbers of ``condensed``,
     stance leg   s_l + M_bl' m + J_l' l = 0
     base         s_b + M_b' m + sum_stance J_bl' l = 0
 
-As in (3) and (4) l is eliminated. c_l is what stops the foot; l'c_l / |c_l| is by how much the
-least cost falls for each unit by which |c_l| is less, negative if it does.
+As in (3) and (4) l is eliminated. c_l is the acceleration that stops the foot; l'c_l / |c_l| is by
+how much the optimal cost falls per unit by which |c_l| is less, negative if it falls.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """The whole-body controller: (snapshot, reference) -> torques, by one quadratic program a tick.
 
-No back end may be given numbers that are not finite. A nan makes its way through a solver in many
-forms: one takes seconds to give up, another takes a nan bound for an open side, and an infinite
-least force is no bound to a third. So every back end is asked only after the arrays were looked at,
-used or not, and the error names the first bad number. The least normal force may be -inf and the
-greatest inf: there is no such bound then.
+No back end gets numbers that are not finite. Solvers treat a nan in many ways: one takes seconds to
+give up, another takes a nan bound for an open side, and an infinite minimum force is no bound to a
+third. So all arrays are checked before any back end is called, used or not, and the error names the
+first bad number. The minimum normal force may be -inf and the maximum inf: there is no such bound
+then.
 """
 
 from __future__ import annotations

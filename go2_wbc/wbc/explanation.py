@@ -1,4 +1,4 @@
-"""Why the QP decided as it did: which limits bind, what each costs, what more of it would give.
+"""Why the QP decided as it did: the active limits, the price of each, what more of it would give.
 
 With the tasks' cost J = sum w |A z - b|^2 / 2, unknowns u and z = Z u + z0, the QP of a tick is
 
@@ -7,24 +7,24 @@ With the tasks' cost J = sum w |A z - b|^2 / 2, unknowns u and z = Z u + z0, the
 and at its optimum (Karush, Kuhn & Tucker; Boyd & Vandenberghe, *Convex Optimization*, 2004, sec.
 5.5.3) there is a multiplier y of each row with
 
-    H u + g + C'y = 0,    y >= 0 at an upper side, <= 0 at a lower one, 0 where none binds     (1)
+    H u + g + C'y = 0,    y >= 0 at an upper limit, <= 0 at a lower one, 0 where none is active (1)
 
-|y| is by how much the least cost falls for each unit by which that side is wider (sec. 5.6.3). The
-optimum itself moves along du, dy while the same rows A bind (Nocedal & Wright, *Numerical
-Optimization*, 2006, sec. 16.1), for the i-th of them being wider by one unit on its side s = +-1:
+|y| is by how much the optimal cost falls per unit by which that limit is relaxed (sec. 5.6.3). The
+optimum itself moves along du, dy while the same rows A stay active (Nocedal & Wright, *Numerical
+Optimization*, 2006, sec. 16.1), for the i-th of them relaxed by one unit on its side s = +-1:
 
     [ H    C_A' ] [ du ]   [    0    ]
     [ C_A   0   ] [ dy ] = [ s_i e_i ]    (2)
 
-So each residual r = A z - b moves by A Z du, and since sum w r'A Z du = -|y_i|, the multiplier
-falls apart into what every row of a task gains or loses by it. The row that gains most is what more
-of the limit "gives". (2) holds until another row binds or one of these lets go: ``reach``.
+So each residual r = A z - b changes by A Z du, and since sum w r'A Z du = -|y_i|, the multiplier is
+the sum of the contributions of all task rows. The row that gains most is what more of the limit
+"gives". (2) holds until another row becomes active or one of these inactive: ``reach``.
 
-Limits are compared by what the cost falls if one is lifted altogether, which is solved for.
+Limits are ranked by how much the cost falls without one, from another solve.
 
 Whichever back end decided: these are multipliers of its QP as our active set solves it
-(``algebra.active_set``). Where the rows that bind depend on one another multipliers are not unique,
-and a set that satisfies (1) is told.
+(``algebra.active_set``). Where active rows are linearly dependent, multipliers are not unique, and
+a set that satisfies (1) is reported.
 """
 
 from __future__ import annotations
