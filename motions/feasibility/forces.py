@@ -26,8 +26,7 @@ Two questions are answered:
   could hold; and a short slip moves little. Each foot is a sliding block (Newmark 1965, *Effects of
   earthquakes on dams and embankments*): the force in excess of friction accelerates it, and
   friction stops it. The mass of the block, and the force by which the joints hold it, were fitted
-  to motions in MuJoCo (``FOOT_MASS``, ``HELD``): a foot with 5 N on it that lacks 2 N hardly
-  slides.
+  to motions in MuJoCo (``FOOT_MASS``, ``HELD``).
 
 Where a leg turns fast, a foot also creeps, on any friction. A contact constraint of MuJoCo asks for
 J a = -b J v (Todorov, *Convex and analytically-invertible dynamics with contacts and constraints*,
