@@ -65,7 +65,7 @@ def trial(seed: int) -> dict[str, object]:
         "done": not harm,
         "fell": FELL in harm,
         "harm": "; ".join(harm),
-        "margins": json.dumps({name: f.room for name, f in report.margins.items()}),
+        "margins": json.dumps({name: f.margin for name, f in report.margins.items()}),
     }
 
 

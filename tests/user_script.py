@@ -142,7 +142,6 @@ def design(song: Path) -> Timeline:
     """A motion, its check and its files."""
     report: FeasibilityReport = check(greet, friction=0.6)
     findings: list[Finding] = [*report.failures, *report.warnings]
-    room: float = min(one.room for one in findings)
     suggestions: tuple[Suggestion, ...] = suggest(greet())
     checker = FeasibilityChecker()
     checked: CheckedMotion = checker.evaluate("wave")
@@ -156,7 +155,7 @@ def design(song: Path) -> Timeline:
     save_plan(plan, Path("greet.plan"))
     save_motion(line, Path("greet.json"))
     stored = load_plan(Path("greet.plan"))
-    print(room, suggestions, checked, same, playable, found, own, rhythm.times, stored)
+    print(findings, suggestions, checked, same, playable, found, own, rhythm.times, stored)
     print(motion_names(), Posture.STAND is Stance.STAND, World(friction=0.4))
     return line
 

@@ -3,8 +3,7 @@
 The chance that a motion is done: every margin as a chance, multiplied. A limit that is met by much
 is no risk, one that is broken by much is no chance; between them the chance rises along a logistic
 curve. Margins reach from a hair's breadth to a hundred times the limit, so the curve is over
-``x_i = asinh(m_i / u_i)``, which is as the margin near 0 and as its logarithm far off. A slip is
-off by a factor rather than by millimetres, so its margin is that of the logarithm. With
+``x_i = asinh(m_i / u_i)``, which is as the margin near 0 and as its logarithm far off. With
 ``c_i``, where check ``i`` holds in half of the cases, and ``w_i`` > 0, the width of the rise:
 
     P = s(b) (e + (1 - e) prod_i s((x_i - c_i) / w_i)),    s(x) = 1 / (1 + exp(-x))
@@ -114,7 +113,6 @@ NOISE = 1e-6  #: A value below this is nothing but rounding, and is shown as 0
 SURE = 0.99  #: A chance above this, or below 1 - this, is not told more exactly
 SUMS = ("slip",)
 """Checks whose values add up: what was too much stays so, but is wrong only while it grows."""
-LEAST_SUM = 3e-4  #: m; less of a sum is as good as nothing
 GROWTH = 5e-5
 """By how much [m] at least from one sample to the next: less is the creep of any movement."""
 STAYS = 1e-3  #: m, rad; a motion that ends nearer than this to where it starts does not go anywhere
@@ -138,14 +136,6 @@ class Finding:
     margin: float
     unit: str
     note: str = ""
-
-    @property
-    def room(self) -> float:
-        """What a chance is told by: the margin; of ``SUMS`` the limit times log(limit / value)."""
-        if self.check not in SUMS:
-            return self.margin
-        most, value = (math.log(one + LEAST_SUM) for one in (self.limit, self.value))
-        return self.limit * (most - value)
 
     def __str__(self) -> str:
         line = f"{self.check}: {self.subject} at {self.time:.2f} s"
@@ -338,7 +328,8 @@ class FeasibilityReport:
     @property
     def probability(self) -> float:
         """Chance, 0 to 1, that the motion is done in ``world``; see ``feasibility.probability``."""
-        return fitted().probability({check: one.room for check, one in self.margins.items()})
+        margins = {check: finding.margin for check, finding in self.margins.items()}
+        return fitted().probability(margins)
 
     def raise_if_infeasible(self) -> None:
         """Do nothing if it is feasible.

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from motions import check
 from motions.feasibility import report
-from motions.feasibility.report import Finding, ProbabilityModel, Rise
+from motions.feasibility.report import ProbabilityModel, Rise
 
 MODEL = ProbabilityModel({"slip": Rise(0.01, 0.5, 0.4), "torque": Rise(2.0, -1.0, 0.5)}, rest=3.0)
 MARGINS = st.floats(-1e6, 1e6)
@@ -39,16 +39,6 @@ def test_causes_multiply_what_no_fit_has_seen_is_yes_or_no_and_the_leak_is_left(
     assert leaky.probability(even) == pytest.approx((0.1 + 0.9 * 0.5) * rest)
     assert leaky.probability({"slip": math.inf}) == pytest.approx(rest)
     assert leaky.probability({"numbers": -1.0}) == 0.0
-
-
-def test_a_slip_counts_by_its_factor_and_other_checks_by_their_margin() -> None:
-    sizes = (0.005, 0.02, 0.0)
-    half, twice, none = (Finding("slip", 0.0, "FL", x, 0.01, 0.01 - x, "m") for x in sizes)
-    assert half.room == pytest.approx(0.01 * math.log(2.0), rel=0.1)
-    assert twice.room == pytest.approx(-half.room, rel=0.1)
-    assert half.room < none.room < math.inf
-    assert Finding("slip", 0.0, "FL", math.inf, 0.01, -math.inf, "m").room == -math.inf
-    assert Finding("lag", 0.0, "trunk", 5e-3, 0.015, 0.01, "m").room == 0.01
 
 
 def test_a_model_comes_back_from_its_values() -> None:
