@@ -13,6 +13,7 @@ from controller.studio.songs import songs_beside, sound_of
 from go2_wbc.errors import Go2WbcError, unknown_name
 from go2_wbc.files import checked_output, write_atomically
 from viz.content import ReplayContent
+from viz.replay.page_data import Prepared
 
 EXPORTS: Final[Mapping[str, str]] = {
     "html": "Offline page",
@@ -134,3 +135,14 @@ def write_pictures(
         viz.export_html(content, path, title=title)
     else:
         viz.export_animation(content, path, speed=1.0, fps=FPS[path.suffix])
+
+
+def whole(content: ReplayContent | Prepared) -> ReplayContent:
+    """What was asked for as a whole.
+
+    Raises:
+        TypeError: if it is only what a page needs.
+    """
+    if isinstance(content, Prepared):
+        raise TypeError("only what a page needs")
+    return content

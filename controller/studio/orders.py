@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from controller.studio.grounds import PlayedGround
 from controller.studio.source import Slot
 from controller.studio.syntax import Site
+from go2_wbc.errors import StudioError
 from go2_wbc.world import World
 from motions.authoring import Value
 
@@ -39,6 +40,7 @@ class Task(Enum):
     PLAY = "play"  #: in MuJoCo, beside the plan
     MEND = "mend"  #: look for changes that make it possible
     NEAREST = "nearest"  #: look for the nearest motion that is possible
+    BESIDE = "beside"  #: check, with the motion of another text as its ghost
     WRITE = "write"  #: to a file: itself, its plan or its trajectory
     REWRITE = "rewrite"  #: make two calls of one, or write out what is computed
 
@@ -61,7 +63,8 @@ class Order:
     chosen: str | None  #: which of its motions; None for the first
     values: Mapping[str, Value]  #: chosen parameters
     task: Task = Task.CHECK  #: what is done with it
-    part: Cut | int | None = None  #: where a call is split, or the place of a bar to be written out
+    part: Cut | int | bytes | None = None
+    """Where a call is split, the place of a bar to be written out, or another text."""
     longest: float = 0.0  #: processor time [s] that one jump may be solved for; 0: the solver's own
     is_shown: bool = False  #: also without the jumps that were not found by then
     is_looked_for: bool = False  #: what was not found is looked for by another process meanwhile
@@ -117,3 +120,13 @@ class Answer:
     """It rewritten, and the byte behind the call that is chosen then."""
     is_solved: bool = True
     """Whether all that jumps was solved; without content it took longer than it may."""
+
+    def shown(self) -> ReplayContent | Prepared:
+        """Its content.
+
+        Raises:
+            StudioError: if there is none.
+        """
+        if self.content is None:
+            raise StudioError("there is nothing to show")
+        return self.content

@@ -6,7 +6,6 @@ saved: while a bar is dragged, the text as it would be runs.
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import threading
 import time
@@ -16,11 +15,12 @@ from typing import cast, final
 
 from controller.studio.orders import Answer, Doing, Order
 from controller.studio.working import serve
-from controller.sweeps.engine import ONE_THREAD, STARTING
+from controller.sweeps.engine import ONE_THREAD, processes, start
 from go2_wbc.errors import StudioError
 
 LONGEST_WAIT = 10.0
 """Time [s] after which a file is ended that waits, or goes on when its own time is over."""
+LOADED = ("controller.studio.jumping", "controller.studio.making", "viz.replay.page_data")
 LONGEST_WORK = 120.0  #: Time [s] that solving, checking or playing may take
 
 
@@ -39,16 +39,13 @@ class Runner:
         self._start()
 
     def _start(self) -> None:
-        context = multiprocessing.get_context("spawn")
+        context = processes()
         self._pipe, there = context.Pipe()
         self._stop = context.Event()
-        self._process = context.Process(target=serve, args=(there, self._stop), daemon=True)
-        with STARTING:
-            before = os.environ.copy()
-            os.environ.update(ONE_THREAD)  # more would wait for each other, busily
-            self._process.start()
-            os.environ.clear()
-            os.environ.update(before)
+        environment = {**os.environ, **ONE_THREAD}  # more threads would wait for each other, busily
+        arguments = (there, self._stop, environment)
+        self._process = context.Process(target=serve, args=arguments, daemon=True)
+        start(self._process, *LOADED)
         there.close()
         self._is_warm = False
 

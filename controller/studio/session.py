@@ -81,7 +81,7 @@ class Studio:
             self.motion, self._is_looking = shown.title, not shown.is_solved
             token = secrets.token_urlsafe(16)
             self._server = PreviewServer(
-                _whole(self._content(shown)),
+                exports.whole(self._content(shown)),
                 shown.title,
                 port,
                 self._choose,
@@ -98,6 +98,7 @@ class Studio:
                     "/highest": self.highest,
                     "/mend": self.mend,
                     "/nearest": self.nearest,
+                    "/beside": self.beside,
                     "/certify": self.certify,
                     "/export": self.export,
                 },
@@ -196,7 +197,7 @@ class Studio:
             self._server.publish(self._content(shown), shown.title)
             return site
         editor = {"bars": [bars.draft(bar) for bar in shown.bars]}
-        content = replace(_shown(shown), editor=editor)
+        content = replace(shown.shown(), editor=editor)
         return self._server.answer({}, content, shown.title, order.get("has"))
 
     def _edited(self, order: Mapping[str, object]) -> Source:
@@ -331,6 +332,15 @@ class Studio:
         told["told"] = shown.told
         return self._server.answer(told, self._content(shown), shown.title, order.get("has"))
 
+    def beside(self, order: Mapping[str, object]) -> dict[str, object] | bytes:
+        """What is saved, beside it what change ``which`` of ``mend`` makes of it."""
+        try:
+            after = self._edited({"op": "change", "which": order.get("which")}).data
+            shown = self._run(self._project.saved, Task.BESIDE, after, longest=LONGEST_SOLVE)
+        except StudioError as error:
+            return {"error": str(error)}
+        return self._server.answer({}, self._content(shown), shown.title, order.get("has"))
+
     def certify(self, order: Mapping[str, object]) -> dict[str, object]:
         """How often what is saved is done in ``runs`` random worlds around the one that is chosen.
 
@@ -372,7 +382,7 @@ class Studio:
 
         def content() -> ReplayContent:
             shown = self._run(self._project.saved, Task.EXPORT)
-            return replace(_whole(self._content(shown)), editor=None)
+            return replace(exports.whole(self._content(shown)), editor=None)
 
         file, motion = self._project.path, self.motion or ""
         told, path = exports.exported(file, motion, order, content, self._writer())
@@ -433,7 +443,7 @@ class Studio:
         self,
         data: bytes,
         task: Task = Task.CHECK,
-        part: Cut | int | None = None,
+        part: Cut | int | bytes | None = None,
         chosen: str | None = None,
         longest: float = 0.0,
         *,
@@ -441,7 +451,7 @@ class Studio:
     ) -> Answer:
         order = self._order(data, task, longest, chosen)
         order = replace(order, part=part, is_afresh=is_afresh)
-        is_quick = task in (Task.CHECK, Task.DRAFT, Task.EXPORT, Task.REWRITE)
+        is_quick = task in (Task.CHECK, Task.DRAFT, Task.EXPORT, Task.REWRITE, Task.BESIDE)
         answer = (self._runner if is_quick else self._player).run(order)
         if data == self._project.saved and answer.bars:
             self._bars, self._is_solved = answer.bars, answer.is_solved
@@ -480,17 +490,4 @@ class Studio:
     def _content(self, shown: Answer) -> ReplayContent | Prepared:
         editor = bars.editor(shown, self._project, self._world, self._ground)
         self._motions = shown.motions
-        return replace(_shown(shown), editor=editor)
-
-
-def _shown(answer: Answer) -> ReplayContent | Prepared:
-    if answer.content is None:
-        raise StudioError("there is nothing to show")
-    return answer.content
-
-
-def _whole(content: ReplayContent | Prepared) -> ReplayContent:
-    """What was asked for as a whole."""
-    if isinstance(content, Prepared):
-        raise TypeError("only what a page needs")
-    return content
+        return replace(shown.shown(), editor=editor)

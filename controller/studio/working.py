@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import math
+import os
 import threading
 import time
 from collections import Counter
@@ -113,12 +114,14 @@ class Teller:
             raise StudioError(STOPPED)
 
 
-def serve(pipe: Connection, stop: Event) -> None:
+def serve(pipe: Connection, stop: Event, environment: Mapping[str, str]) -> None:
     """Answer orders: a word once the robot is loaded, one when the file has run, and the answer.
 
     A first order that is ``None`` has it play something before that word: then all of it is loaded.
-    What was begun ends where ``stop`` is set.
+    What was begun ends where ``stop`` is set. ``environment`` is that of the process.
     """
+    os.environ.clear()
+    os.environ.update(environment)
     with suppress(EOFError, ConnectionError, KeyboardInterrupt):
         order: Order | None = pipe.recv()
         from controller.studio.jumping import Jumps
@@ -170,7 +173,7 @@ def _answer(
         if isinstance(order.part, Cut):
             after = split(source, str(order.path), made.marks, order.part)
             return Answer(motion.name, text=(after.data, after.site and after.offset(after.site)))
-        if order.part is not None:
+        if isinstance(order.part, int):
             after = written_out(source, maker, order, made)
             return Answer(motion.name, text=(after.data, None))
         if order.out is not None:
@@ -179,8 +182,8 @@ def _answer(
         (checked, is_coarse), text = jumps.evaluate(line, order), None
         if order.task is Task.PLAY:
             content, told = _played(checked, jumps.checker, order.world, order.ground, teller)
-        elif order.task is Task.NEAREST:
-            after, near = _nearest(source, order, made, maker)
+        elif order.task in (Task.NEAREST, Task.BESIDE):
+            after, near = _other(source, order, made, maker)
             content, told = beside(checked, jumps.checker.evaluate(near))
             text = after.data, None
         else:
@@ -205,11 +208,13 @@ def _answer(
     return Answer(motion.name, shown, bars, made.names, told, made.notes, **more)
 
 
-def _nearest(source: Source, order: Order, made: Made, maker: Maker) -> tuple[Source, Timeline]:
-    """The text that asks for the nearest motion, and what it makes."""
+def _other(source: Source, order: Order, made: Made, maker: Maker) -> tuple[Source, Timeline]:
+    """The text that is shown beside, and what it makes: if none is given, the nearest motion."""
     from controller.studio.nearness import asking
     from motions.language.timeline_data import NEAREST
 
+    if isinstance(order.part, bytes):
+        return Source(order.part), maker.make(replace(order, data=order.part)).line
     found: list[Timeline] = []
 
     def does_ask(after: Source) -> bool:

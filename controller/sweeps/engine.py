@@ -21,15 +21,19 @@ import time
 import traceback
 from abc import ABC, abstractmethod
 from collections import Counter, deque
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from multiprocessing import connection, resource_tracker
 from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Generic, TypeVar, final
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, final
+
+if TYPE_CHECKING:
+    from multiprocessing.context import ForkServerContext, SpawnContext
 
 Item = TypeVar("Item")
 
@@ -284,17 +288,12 @@ class Worker:
             order: its function.
             memory: shared with it (``RawArray``); the function is called with it, behind the item.
         """
-        context = multiprocessing.get_context("forkserver" if sys.platform == "linux" else "spawn")
+        context = processes()
         self._pipe, its_end = context.Pipe()
-        with its_end, STARTING:
+        with its_end:
             arguments = (its_end, order, {**os.environ, **ONE_THREAD}, *memory)
             self._process = context.Process(target=serve, args=arguments, name="worker")
-            with _start():
-                try:
-                    self._process.start()
-                except (EOFError, OSError):  # the server of processes is just dying
-                    time.sleep(DYING)
-                    self._process.start()
+            start(self._process)
         self.handles = (self._pipe, self._process.sentinel)
 
     def give(self, item: bytes) -> None:
@@ -325,26 +324,35 @@ class Worker:
         return f"exit code {code}" if code >= 0 else f"killed by {signal.Signals(-code).name}"
 
 
-@contextmanager
-def _start() -> Iterator[None]:
-    """While a worker starts, and with the first one the fork server.
+def processes() -> ForkServerContext | SpawnContext:
+    """How processes are made that ``start`` starts."""
+    return multiprocessing.get_context("forkserver" if sys.platform == "linux" else "spawn")
 
-    The server finds the modules that this process does, and has the environment of a worker: some
-    of it is heeded by an interpreter that starts only. The main module of this process is hidden,
-    which a worker would run again. Ctrl-C has to wait: the server would end with a traceback.
+
+def start(process: BaseProcess, *modules: str) -> None:
+    """Start a process with the environment of a worker, and before the first one the fork server.
+
+    The server loads these ``modules``, too, and finds all that this process does; some of the
+    environment is heeded by an interpreter that starts only. The main module of this process is
+    hidden, which a worker would run again. Ctrl-C has to wait, in the process, too: the server
+    would end with a traceback.
     """
-    multiprocessing.set_forkserver_preload(list(LOADED))
-    resource_tracker.ensure_running()  # it lets Ctrl-C in again when it starts
-    main, before = sys.modules["__main__"], dict(os.environ)
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    sys.modules["__main__"] = ModuleType("__main__")
-    own = {**ONE_THREAD, "PYTHONPATH": os.pathsep.join(sys.path)}
-    os.environ.update(own)
-    try:
-        yield
-    finally:
-        for name in own:
-            del os.environ[name]
-        os.environ.update(before)
-        sys.modules["__main__"] = main
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+    with STARTING:
+        multiprocessing.set_forkserver_preload([*LOADED, *modules])
+        resource_tracker.ensure_running()  # it lets Ctrl-C in again when it starts
+        main, before = sys.modules["__main__"], dict(os.environ)
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        sys.modules["__main__"] = ModuleType("__main__")
+        own = {**ONE_THREAD, "PYTHONPATH": os.pathsep.join(sys.path)}
+        os.environ.update(own)
+        try:
+            process.start()
+        except (EOFError, OSError):  # the server of processes is just dying
+            time.sleep(DYING)
+            process.start()
+        finally:
+            for name in own:
+                del os.environ[name]
+            os.environ.update(before)
+            sys.modules["__main__"] = main
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)

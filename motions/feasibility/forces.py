@@ -141,7 +141,9 @@ LOADED = 0.999  #: Share of its load from which on a foot counts as standing ful
 PRESSED = 10.0
 """Normal force [N] from which on the friction of a foot matters; below, the quotient is noise and
 a slip moves nothing (own choice, 6 % of the weight)."""
-STILL = 1e-6  #: Joint speed [rad/s] below which a motor drives nothing: more than rounding, 1e-15
+STILL = 1e-3
+"""Joint speed [rad/s] below which a motor drives nothing. A spline rings for some samples before a
+joint moves, and up to 1e-5 rad/s of that differ with how a motion was put together."""
 NO_SUPPORT = 1.0
 """How far outside [m] of their support CoM and zero-moment point count when no foot stands."""
 FAR = 1e3  #: Where feet in the air count as being [m], of those that tell supports apart

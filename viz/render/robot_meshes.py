@@ -69,11 +69,28 @@ def visuals_of(recording: Recording) -> RobotVisuals:
         ConfigError: for a robot that does not ship.
         DescriptionError: as ``load_robot_visuals``.
     """
+    return load_robot_visuals(recording.robot, _file_of(recording))
+
+
+def bare_robot_of(recording: Recording) -> RobotVisuals:
+    """The same without meshes, which take their time; raises the same."""
+    return _bare_robot(recording.robot, _file_of(recording))
+
+
+def _file_of(recording: Recording) -> str:
     file = recording.model_file
     if file and not Path(file).is_file():
         _logger.warning("%s is gone: the robot is drawn as any %s", file, recording.robot)
-        file = ""
-    return load_robot_visuals(recording.robot, file)
+        return ""
+    return file
+
+
+@functools.cache
+def _bare_robot(robot: str, model_file: str) -> RobotVisuals:
+    file = model_file if model_file and is_urdf(model_file) else None
+    description = find_description(file, robot)
+    model = pin.buildModelFromUrdf(str(description.urdf_path), pin.JointModelFreeFlyer())
+    return RobotVisuals({}, pin.GeometryModel(), model, description)
 
 
 @functools.cache
@@ -88,14 +105,12 @@ def load_robot_visuals(robot: str = GO2, model_file: str = "") -> RobotVisuals:
         ConfigError: for a robot that does not ship.
         DescriptionError: if files are missing or hold no triangles.
     """
-    is_mjcf = bool(model_file) and not is_urdf(model_file)
-    description = find_description(None if is_mjcf else model_file or None, robot)
-    urdf, folders = str(description.urdf_path), [str(folder) for folder in description.package_dirs]
-    model = pin.buildModelFromUrdf(urdf, pin.JointModelFreeFlyer())
     kind, geometry = pin.GeometryType.VISUAL, pin.GeometryModel()
-    if is_mjcf:
-        return _as_in_mjcf(model_file, RobotVisuals({}, geometry, model, description))
-    pin.buildGeomFromUrdf(model, urdf, kind, geometry, folders)
+    bare = replace(_bare_robot(robot, model_file), geometry=geometry)
+    if model_file and not is_urdf(model_file):
+        return _as_in_mjcf(model_file, bare)
+    folders = [str(folder) for folder in bare.description.package_dirs]
+    pin.buildGeomFromUrdf(bare.model, str(bare.description.urdf_path), kind, geometry, folders)
     meshes: dict[str, tuple[Surface, ...]] = {}
     for item in geometry.geometryObjects:
         part = _solid(item)
@@ -104,7 +119,7 @@ def load_robot_visuals(robot: str = GO2, model_file: str = "") -> RobotVisuals:
             meshes[item.name] = _surfaces([part])
         elif item.meshPath not in meshes:
             meshes[item.meshPath] = _surfaces(read_mesh(Path(item.meshPath)))
-    return _slender(RobotVisuals(meshes, geometry, model, description))
+    return _slender(replace(bare, meshes=meshes))
 
 
 def _slender(visuals: RobotVisuals) -> RobotVisuals:

@@ -38,7 +38,7 @@ from viz.content import ReplayContent, Verdict, checked_content
 from viz.render.camera import smoothed
 from viz.render.ground import COLORS, grid_of
 from viz.render.mesh import Surface
-from viz.render.robot_meshes import RobotVisuals, feet_along, visuals_of
+from viz.render.robot_meshes import RobotVisuals, bare_robot_of, feet_along, visuals_of
 from viz.replay.packing import Pack, Packed, compressed_text
 from viz.style import FORCE, INK, LEG_COLORS
 
@@ -283,15 +283,15 @@ def replay_frames(recording: Recording) -> tuple[float, dict[str, np.ndarray]]:
     last = len(recording.time) - 1
     rows = np.minimum(np.searchsorted(recording.time, wanted - 0.25 / rate), last)
     rows[-1] = last
-    visuals, q = visuals_of(recording), _continuous(recording.q[rows])
-    feet = feet_along(visuals, q)
-    heights = feet[:, :, 2].mean(axis=1) - visuals.foot_radius
+    robot, q = bare_robot_of(recording), _continuous(recording.q[rows])
+    feet = feet_along(robot, q)
+    heights = feet[:, :, 2].mean(axis=1) - robot.foot_radius
     heights = heights if len(recording.ground) else np.zeros(count)
     below = np.interp(recording.time, wanted, heights)
     places = np.column_stack([recording.q[:, :2], below])
     target = smoothed(recording.time, places, _CAMERA_SMOOTHING)
     ratios = np.ascontiguousarray(np.abs(recording.tau).T)
-    ratios /= np.array(visuals.description.efforts)[:, None]
+    ratios /= np.array(robot.description.efforts)[:, None]
     return rate, {
         "q": q,
         "feet": feet.reshape(-1, 12),

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
+import numpy as np
 import pytest
 
 from controller.studio.jumping import Jumps
@@ -138,6 +139,27 @@ def test_it_is_shown_beside_and_written_when_it_is_taken(studio: Studio, file: P
     assert "look for it again" in str(studio.edit(late)["error"])  # pyright: ignore[reportCallIssue, reportArgumentType]
     assert studio.edit({"op": "undo"}) == {}
     assert file.read_text(encoding="utf-8") == SWAY
+
+
+@pytest.mark.slow
+def test_a_change_of_all_of_it_is_shown_beside_before_it_is_taken(
+    studio: Studio, file: Path
+) -> None:
+    changes = studio.mend({})["changes"]
+    assert isinstance(changes, tuple)
+    for which in range(len(changes)):
+        answer = studio.beside({"which": which})
+        assert isinstance(answer, bytes)
+        header, arrays = read_pack(read_message(answer, b"")[1])
+        assert not header["verdict"]["ok"]
+        assert header["proposal"]["ok"]
+        assert len(header["editor"]["bars"]) == 5, "one's own"
+        assert not np.array_equal(arrays["ghost.q"], arrays["q"])
+    for wrong in (len(changes), -1, None, "0"):
+        told = studio.beside({"which": wrong})
+        assert isinstance(told, dict)
+        assert "one of those that were proposed" in str(told["error"])
+    assert file.read_text(encoding="utf-8") == SWAY, "nothing is written"
 
 
 def test_an_edit_ends_the_search(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:

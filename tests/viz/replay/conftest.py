@@ -12,7 +12,7 @@ import pytest
 import viz
 from go2_wbc.recording import Recording
 from tests.viz.replay.browsing import Tab, chromium
-from tests.viz.replay.studio_tab import studio_tab, undo_all
+from tests.viz.replay.studio_tab import served, studio_tab, undo_all
 from viz.content import ReplayContent
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def open_page(chromium_browser: Browser, tmp_path_factory: pytest.TempPathFactor
 @pytest.fixture(scope="module")
 def studio(file: Path, chromium_browser: Browser) -> Iterator[Tab]:
     """The studio's page with the ``file`` of the module, by one who needs no tour."""
-    with studio_tab(file, chromium_browser) as tab:
+    with served(file) as url, studio_tab(url, chromium_browser) as tab:
         tab.page.get_by_role("button", name="Skip the tour").click()
         yield tab
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tests.live_preview import LivePreview
+from controller.cli.motion_preview import POLL_PERIOD
+from controller.studio.session import Studio
 from tests.viz.replay.browsing import Tab
 
 if TYPE_CHECKING:
@@ -17,14 +19,33 @@ SETTLED = "!studio.isBusy && !studio.waiting"
 
 
 @contextmanager
-def studio_tab(file: Path, browser: Browser) -> Iterator[Tab]:
+def served(file: Path) -> Iterator[str]:
+    """The address of a studio in this process, where the robot is loaded; it looks at its file."""
+    is_over = threading.Event()
+    with Studio(file, None, 0) as studio:
+
+        def look() -> None:
+            while not is_over.wait(POLL_PERIOD):
+                studio.look()
+
+        looking = threading.Thread(target=look)
+        looking.start()
+        try:
+            yield studio.url
+        finally:
+            is_over.set()
+            looking.join()
+
+
+@contextmanager
+def studio_tab(url: str, browser: Browser) -> Iterator[Tab]:
     """The page as it is opened first; it must not complain, nor ask another server."""
-    with LivePreview(str(file), command="studio") as opened, Tab(browser) as tab:
-        tab.open(opened.url)
+    with Tab(browser) as tab:
+        tab.open(url)
         tab.wait_for("window.studio && replay.version")
         yield tab
         assert tab.complaints == []
-        assert all(url.startswith(opened.url.partition("?")[0]) for url in tab.requested)
+        assert all(one.startswith(url.partition("?")[0]) for one in tab.requested)
 
 
 def do(tab: Tab, gesture: str) -> None:

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.live_preview import LivePreview
 from tests.viz.replay.browsing import Tab
-from tests.viz.replay.studio_tab import SETTLED
+from tests.viz.replay.studio_tab import SETTLED, served
 from tests.viz.replay.test_studio_hands_browser import DANCE
 
 if TYPE_CHECKING:
@@ -69,21 +68,21 @@ FINDINGS = """(() => {
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[LivePreview, Path]]:
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
     path = tmp_path_factory.mktemp("studio") / "dance.py"
     path.write_text(DANCE.replace("over=0.6).home", "pitch=deg(41.0), over=0.6).home", 1))
-    with LivePreview(str(path), command="studio") as live:
-        yield live, path
+    with served(path) as url:
+        yield url, path
 
 
-def _open(tab: Tab, live: LivePreview) -> None:
-    tab.open(live.url)
+def _open(tab: Tab, url: str) -> None:
+    tab.open(url)
     tab.wait_for("window.studio && replay.version")
 
 
 @pytest.mark.parametrize("is_dark", [False, True], ids=["light", "dark"])
 def test_everything_has_a_name_and_can_be_read(
-    opened: tuple[LivePreview, Path], chromium_browser: Browser, is_dark: bool
+    opened: tuple[str, Path], chromium_browser: Browser, is_dark: bool
 ) -> None:
     states = (
         *("studio.tools.told", "studio.tour.end()", "studio.select(0)", "studio.world.open()"),
@@ -102,9 +101,7 @@ def test_everything_has_a_name_and_can_be_read(
         assert tab.complaints == []
 
 
-def test_what_is_wrong_is_found(
-    opened: tuple[LivePreview, Path], chromium_browser: Browser
-) -> None:
+def test_what_is_wrong_is_found(opened: tuple[str, Path], chromium_browser: Browser) -> None:
     with Tab(chromium_browser) as tab:
         _open(tab, opened[0])
         tab.evaluate("studio.tour.end()")
@@ -116,12 +113,12 @@ def test_what_is_wrong_is_found(
 
 
 def test_a_motion_is_edited_with_keys_alone(
-    opened: tuple[LivePreview, Path], chromium_browser: Browser
+    opened: tuple[str, Path], chromium_browser: Browser
 ) -> None:
-    live, path = opened
+    url, path = opened
     before = path.read_text(encoding="utf-8")
     with Tab(chromium_browser) as tab:
-        _open(tab, live)
+        _open(tab, url)
         press = tab.page.keyboard.press
         press("Escape")  # the tour
         assert tab.evaluate("document.getElementById('tour') === null")
@@ -140,9 +137,7 @@ def test_a_motion_is_edited_with_keys_alone(
     assert path.read_text(encoding="utf-8") == before
 
 
-def test_two_fingers_zoom_the_time(
-    opened: tuple[LivePreview, Path], chromium_browser: Browser
-) -> None:
+def test_two_fingers_zoom_the_time(opened: tuple[str, Path], chromium_browser: Browser) -> None:
     with Tab(chromium_browser, touch=True) as tab:
         _open(tab, opened[0])
         tab.evaluate("studio.tour.end()")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.controller.studio.test_session import GREET
+from tests.live_preview import LivePreview
 from tests.viz.replay.browsing import Tab
 from tests.viz.replay.studio_tab import SETTLED, studio_tab
 
@@ -34,7 +35,8 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def studio(file: Path, chromium_browser: Browser) -> Iterator[Tab]:
-    with studio_tab(file, chromium_browser) as tab:
+    program = LivePreview(str(file), command="studio")
+    with program as opened, studio_tab(opened.url, chromium_browser) as tab:
         for _ in range(4):  # who opens it first is shown around
             tab.page.get_by_role("button", name="Next").click()
         tab.page.get_by_role("button", name="Done").click()

@@ -88,3 +88,27 @@ def test_an_edit_ends_a_proposal(tab: Tab, file: Path) -> None:
     tab.wait_for(f"{SETTLED} && studio.editor.undo")
     assert tab.evaluate(f"{BOX}.hidden && replay.data.ghost === null")
     assert "hold(0.4)" in file.read_text(encoding="utf-8")
+
+
+def test_a_suggestion_is_seen_before_it_is_taken(tab: Tab, file: Path) -> None:
+    _propose(tab)
+    tab.page.keyboard.press("Escape")
+    tab.wait_for(f"{BOX}.hidden && replay.data.ghost === null")
+    before = tab.stage()
+    button = tab.page.locator("#studio-changes button").first
+    meaning = button.inner_text()
+    button.hover()
+    tab.wait_for("replay.data.ghost !== null")
+    assert np.abs(tab.stage() - before).max() > 50.0, "a ghost in the 3D view"
+    assert tab.text("#who") == f"Solid: the plan. Blue: {meaning}."
+    assert tab.text("#studio-say").startswith(f"beside yours, in blue: {meaning}. It is feasible")
+    assert tab.text("#badge") == "5 limits broken", "that is one's own"
+    tab.page.mouse.move(5, 5)
+    tab.wait_for("replay.data.ghost === null")
+    assert np.abs(tab.stage() - before).max() < 2.0
+    button.focus()
+    tab.wait_for("replay.data.ghost !== null")
+    assert file.read_text(encoding="utf-8") == SWAY, "it is only looked at"
+    tab.page.keyboard.press("Enter")
+    tab.wait_for(f"{SETTLED} && studio.editor.undo && replay.data.ghost === null")
+    assert tab.text("#badge").startswith("feasible")

@@ -1,12 +1,15 @@
 "use strict";
 // The nearest motion that the robot can do, beside one's own until it is taken or left: its ghost,
-// its curves, how far it is, and the lines of the file that it changes.
+// its curves, how far it is, and the lines of the file that it changes. A change of all of it is
+// seen so while its button is pointed at, or has the focus.
 
 class Nearest {
   /** @type {Studio} */ studio;
+  /** @type {ReplayData[]} */ peeked;
+  /** @type {number} */ which;
 
   constructor(studio) {
-    this.studio = studio;
+    Object.assign(this, { studio, peeked: [], which: null }); // what is peeked at, and what was shown
     this.box = element("section", { id: "nearest", className: "card", hidden: true, tabIndex: -1 });
     this.box.setAttribute("aria-label", "Proposal: the nearest motion");
   }
@@ -19,6 +22,37 @@ class Nearest {
   /** @param {ReplayData} data */
   use(data) {
     if (!data.proposed) this.box.hidden = true;
+    if (!this.peeked.includes(data)) this.peeked = [];
+  }
+
+  // The motion with a change that is one of those that were offered, beside one's own.
+  /**
+   * @param {number} which
+   * @param {string} meaning
+   */
+  async peek(which, meaning) {
+    const { studio } = this;
+    const { base } = studio.editor;
+    this.which = which;
+    const { data, error } = await studio.post("beside", { which });
+    if (this.which !== which || studio.editor.base !== base || studio.isBusy) return;
+    if (error) return studio.tell(error, true);
+    this.peeked = [data, this.peeked[1] ?? studio.player.data];
+    studio.player.use(data);
+    const { text, chance } = data.header.proposal;
+    studio.tell(`beside yours, in blue: ${meaning}. It is ${text}, chance ${percent(chance, 0)}`);
+    document.getElementById("who").textContent = `Solid: the plan. Blue: ${meaning}.`;
+    document.querySelector("[data-ghost=ghost]").firstChild.textContent = "Changed";
+  }
+
+  // Back to what was shown before.
+  unpeek() {
+    this.which = null;
+    const [, before] = this.peeked;
+    if (!before) return;
+    this.studio.tell("");
+    this.studio.player.use(before);
+    this.peeked = [];
   }
 
   // Looks for it; an edit, and Cancel, end that.

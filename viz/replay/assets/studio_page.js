@@ -392,6 +392,7 @@ class Studio {
     if (!changes || this.editor.base !== base || this.isBusy) return null;
     this.tools.offer(changes.map(([call, meaning], which) => ({
       text: meaning, hint: `appends ${call}`, act: () => this.send({ op: "change", which }, true),
+      peek: () => this.nearest.peek(which, meaning), unpeek: () => this.nearest.unpeek(),
     })));
     const found = changes.length ? "one click, and the robot can do it" : "no change of tempo, size or height is enough";
     this.tell(`${found}; looking for the nearest motion, too…`);

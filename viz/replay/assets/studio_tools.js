@@ -175,9 +175,11 @@ class Tools {
 
 function buttonsOf(changes) {
   const box = element("div", { className: "buttons" });
-  box.append(...changes.map(({ text, hint, act }) => {
+  box.append(...changes.map(({ text, hint, act, peek, unpeek }) => {
     const button = element("button", { textContent: text, title: hint });
     button.addEventListener("click", act);
+    for (const kind of peek ? ["pointerenter", "focus"] : []) button.addEventListener(kind, peek);
+    for (const kind of peek ? ["pointerleave", "blur"] : []) button.addEventListener(kind, unpeek);
     return button;
   }));
   return box;
