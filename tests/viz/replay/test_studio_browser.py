@@ -50,21 +50,40 @@ def _bar(tab: Tab, index: int) -> dict[str, Any]:
 def test_an_edge_is_dragged(tab: Tab, file: Path) -> None:
     box, mouse = _bar(tab, 0), tab.page.mouse
     right, middle = box["x"] + box["width"], box["y"] + box["height"] / 2
-    second = box["width"] / 0.6
+    second, whole = box["width"] / 0.6, tab.evaluate(TRIANGLES)
     mouse.move(right - 3, middle)
     mouse.down()
     mouse.move(right - 3 + 0.2 * second, middle, steps=3)
     tab.wait_for(f"{SAID} === 'not saved yet' && Math.abs(replay.data.duration - 3.5) > 0.1")
     assert file.read_text(encoding="utf-8") == GREET, "a draft is not saved"
     assert tab.page.locator("[data-slot=over]").input_value() == "0.8", "numbers follow the hand"
-    assert tab.evaluate(f"{TRIANGLES} < 15000"), "a view that is drawn in software can follow"
+    assert tab.evaluate(f"{TRIANGLES} < {0.08 * whole}"), (
+        "a view that is drawn in software can follow"
+    )
     mouse.move(right - 3 + 0.3 * second, middle, steps=2)
     mouse.up()
     tab.wait_for(f"{SAID} === 'saved'")
     tab.wait_for(SETTLED)
     assert file.read_text(encoding="utf-8") == GREET.replace("(10.0), over=0.6", "(10.0), over=0.9")
     assert _bar(tab, 1)["x"] > right + 0.2 * second, "what follows comes later"
-    assert tab.evaluate(f"{TRIANGLES} > 30000")
+    assert tab.evaluate(TRIANGLES) == whole, "of all parts, small ones too"
+
+
+def test_the_picture_follows_an_edge_before_the_server_has_told(tab: Tab) -> None:
+    tab.evaluate("replay.scrub(0.3); studio.post = () => new Promise(() => {}); 0")
+    box, mouse = _bar(tab, 0), tab.page.mouse
+    right, middle = box["x"] + box["width"] - 3, box["y"] + box["height"] / 2
+    pitch = "(() => { const { y, w } = replay.scene.body.base.quaternion; return y / w; })()"
+    half, before = [tab.evaluate(f"replay.scene.show({t}), {pitch}") for t in (0.15, 0.3)]
+    mouse.move(right, middle)
+    mouse.down()
+    mouse.move(right + box["width"], middle, steps=3)  # twice as long
+    shown = tab.evaluate(pitch)
+    tab.evaluate("delete studio.post, studio.tracks.dragged = null, studio.giveUp()")
+    mouse.up()
+    tab.evaluate("studio.isBusy = false")
+    assert shown == pytest.approx(half, rel=0.25), "to a step of the clock"
+    assert before > 2.0 * half
 
 
 @pytest.mark.parametrize(("index", "own"), [(0, ", over=0.734)"), (1, ".home(over=.60)")])

@@ -2,7 +2,7 @@
 // Fewer triangles and pixels, for as long as a hand moves something: a computer that draws without a
 // graphics card needs 0.4 s for all of the robot's.
 
-const COARSE_CELL = 0.02; // m; the corners of triangles within it become one
+const COARSE_CELL = [0.02, 0.05], COARSE_SHARE = 0.35; // m, of a part's second extent; the corners of triangles within it become one
 const COARSE_PIXELS = 0.5; // share of the pixels along a line
 const COARSE_TIME = 1000; // ms, after which a hand that holds still sees all again
 
@@ -11,9 +11,12 @@ const COARSE_TIME = 1000; // ms, after which a hand that holds still sees all ag
 function coarseTriangles(geometry) {
   const { THREE } = MeshCat;
   const { array } = geometry.attributes.position;
+  if (!geometry.boundingBox) geometry.computeBoundingBox();
+  const [, across] = geometry.boundingBox.getSize(new THREE.Vector3()).toArray().sort((a, b) => b - a);
+  const size = Math.min(Math.max(COARSE_SHARE * across, COARSE_CELL[0]), COARSE_CELL[1]);
   const cells = new Map();
   const corner = geometry.index.array.map((k) => {
-    const cell = [0, 1, 2].map((axis) => Math.round(array[3 * k + axis] / COARSE_CELL)).join();
+    const cell = [0, 1, 2].map((axis) => Math.round(array[3 * k + axis] / size)).join();
     if (!cells.has(cell)) cells.set(cell, k);
     return cells.get(cell);
   });
@@ -43,7 +46,7 @@ class Coarse {
     if (!this.isNeeded || isOn === this.isOn) return;
     this.isOn = isOn;
     this.viewer.scene.traverse(({ geometry }) => {
-      if (!geometry?.index || geometry.index.count < 900) return;
+      if (!geometry?.index || geometry.type !== "BufferGeometry") return; // of a shape that is none of the robot's
       if (!this.indexes.has(geometry)) this.indexes.set(geometry, [geometry.index, coarseTriangles(geometry)]);
       geometry.setIndex(this.indexes.get(geometry)[isOn ? 1 : 0]);
     });

@@ -15,7 +15,7 @@ class Tracks {
   /** @type {Map<string, HTMLElement>} */ made;
   /** @type {Map<string, HTMLElement>} */ strips;
   /** @type {{ bar: Bar, index: number, lane: string, row: number, next: number }[]} */ items;
-  /** @type {{ index: number }} */ dragged;
+  /** @type {{ index: number, end?: number }} */ dragged;
   /** @type {number} */ goal;
 
   constructor(studio, view) {
@@ -41,6 +41,7 @@ class Tracks {
     this.editor = editor;
     this.arrange(editor);
     this.draw();
+    this.foresee();
   }
 
   // Lanes, and in them rows: bars that run at once lie below each other.
@@ -238,7 +239,9 @@ class Tracks {
       }
       values = this.studio.lengthFor(bar, bar.span[2] + offset / perSecond, SNAP / perSecond);
       const [start, begin] = bar.span;
-      this.place(button, item, [start, begin, begin + values[lengthOf(bar).name] / ratio(bar)]);
+      this.dragged.end = begin + values[lengthOf(bar).name] / ratio(bar);
+      this.place(button, item, [start, begin, this.dragged.end]);
+      this.foresee();
       this.studio.setMany(bar, values, false);
     };
     const drop = () => {
@@ -260,6 +263,17 @@ class Tracks {
     button.addEventListener("pointermove", move);
     button.addEventListener("pointerup", drop, { once: true });
     button.addEventListener("pointercancel", drop, { once: true });
+  }
+
+  // What is shown with the dragged end where it is now, until the server has told what comes of it:
+  // within the call all is as much later as it is longer, and behind it by the whole.
+  foresee() {
+    const { index, end } = this.dragged ?? {};
+    if (!end) return;
+    const { time, scene } = this.studio.player;
+    const [, begin, shown] = this.editor.bars[index].span;
+    if (time <= begin) return;
+    scene.show(time < end ? begin + (time - begin) * (shown - begin) / (end - begin) : time - end + shown);
   }
 
   // Before which of the other calls the dragged ones would go, with a mark there.
