@@ -96,12 +96,14 @@ def test_a_suggestion_is_seen_before_it_is_taken(tab: Tab, file: Path) -> None:
     tab.wait_for(f"{BOX}.hidden && replay.data.ghost === null")
     before = tab.stage()
     button = tab.page.locator("#studio-changes button").first
+    tab.page.mouse.move(5, 5)
     meaning = button.inner_text()
     button.hover()
     tab.wait_for("replay.data.ghost !== null")
     assert np.abs(tab.stage() - before).max() > 50.0, "a ghost in the 3D view"
-    assert tab.text("#who") == f"Solid: the plan. Blue: {meaning}."
-    assert tab.text("#studio-say").startswith(f"beside yours, in blue: {meaning}. It is feasible")
+    assert tab.text("#who").startswith(f"Solid: the plan. Blue: {meaning}; feasible")
+    assert tab.evaluate("document.querySelector('#studio-changes button').matches(':hover')")
+    assert tab.evaluate(FINDINGS)[1] == []
     assert tab.text("#badge") == "5 limits broken", "that is one's own"
     tab.page.mouse.move(5, 5)
     tab.wait_for("replay.data.ghost === null")

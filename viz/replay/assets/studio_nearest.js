@@ -40,8 +40,7 @@ class Nearest {
     this.peeked = [data, this.peeked[1] ?? studio.player.data];
     studio.player.use(data);
     const { text, chance } = data.header.proposal;
-    studio.tell(`beside yours, in blue: ${meaning}. It is ${text}, chance ${percent(chance, 0)}`);
-    document.getElementById("who").textContent = `Solid: the plan. Blue: ${meaning}.`;
+    document.getElementById("who").textContent = `Solid: the plan. Blue: ${meaning}; ${text}, chance ${percent(chance, 0)}.`;
     document.querySelector("[data-ghost=ghost]").firstChild.textContent = "Changed";
   }
 
@@ -50,7 +49,6 @@ class Nearest {
     this.which = null;
     const [, before] = this.peeked;
     if (!before) return;
-    this.studio.tell("");
     this.studio.player.use(before);
     this.peeked = [];
   }
