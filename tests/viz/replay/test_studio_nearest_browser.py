@@ -92,7 +92,7 @@ def test_an_edit_ends_a_proposal(tab: Tab, file: Path) -> None:
 
 def test_a_suggestion_is_seen_before_it_is_taken(tab: Tab, file: Path) -> None:
     _propose(tab)
-    tab.page.keyboard.press("Escape")
+    tab.evaluate("studio.nearest.leave()")
     tab.wait_for(f"{BOX}.hidden && replay.data.ghost === null")
     before = tab.stage()
     button = tab.page.locator("#studio-changes button").first
