@@ -85,10 +85,6 @@ LEFT_BEHIND, SLACK = 0.3, 0.15
 """Speed [m/s] at which a held foot is left behind by where it shall be, or all of that's speed if
 it is less, give or take: 0.4 in a trot, 0.1 where a paw comes to rest. One that came late against
 its joints' friction, and one whose knee lay on a slope, were left by less but for 16 ms."""
-LOWERED = 0.5
-"""Sine of the angle below the horizontal of its way from which on a foot is let down: one that
-stays there lies on something with its calf, as on the nose of a step (sines of .79 to 1). The ways
-of feet that were held, in a trot and as a paw rose, led up (.29 and more)."""
 
 
 @kernel
@@ -96,8 +92,7 @@ def hold_feet(target: Target, now: Snapshot, tau: Foreign[Array12], held: Array4
     """Fill with what force [N] each foot is held that stays where it shall not, in the air.
 
     With e the way to where it shall be, and the torques ``tau`` that the motors give,
-    e . J^-T (tau - h) / |e|; 0 for the others, and for feet that are let down. Returns the
-    greatest.
+    e . J^-T (tau - h) / |e|; 0 for the others. Returns the greatest.
     """
     way, axes = np.empty(3), np.empty((3, 3))
     for leg in range(4):
@@ -121,7 +116,6 @@ def hold_feet(target: Target, now: Snapshot, tau: Foreign[Array12], held: Array4
         det = dot(a, cross(b, c))
         least = min(LEFT_BEHIND, np.sqrt(led)) - SLACK
         stays = speed < STILL**2 and left > least * np.sqrt(square)
-        stays = stays and way[2] > -LOWERED * np.sqrt(square)
         if square > ASTRAY**2 and stays and abs(det) > 1e-6:  # not stretched
             load = triple(tau[j : j + 3] - now.bias[6 + j : 9 + j])
             work = load[0] * dot(e, cross(b, c)) + load[1] * dot(e, cross(c, a))
