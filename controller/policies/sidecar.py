@@ -22,7 +22,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from controller.observation import OBSERVATION
 from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.errors import PolicyError, unknown_name
@@ -32,7 +31,16 @@ from go2_wbc.records import Array12
 from go2_wbc.robot.description import GO2
 from go2_wbc.validation import is_finite_number
 
-SIZES = {term.name: term.size for term in OBSERVATION.terms}
+SIZES = {
+    "linear_velocity": 3,
+    "angular_velocity": 3,
+    "gravity": 3,
+    "command": 3,
+    "joint_positions": 12,
+    "joint_velocities": 12,
+    "last_action": 12,
+    "clock": 2,
+}
 """What an observation may hold, and how many numbers; of a clock for each of its offsets."""
 LAYOUTS = ("frames", "terms")
 RANGES = ("forward", "lateral", "turning")

@@ -154,7 +154,7 @@ def test_a_trial_on_sensors_is_the_same_trial_with_another_plant() -> None:
         assert not np.array_equal(plant.read().q, plant.truth().q)
 
 
-@pytest.mark.parametrize("words", ["border", "envelopes", "probability --motions 1"])
+@pytest.mark.parametrize("words", ["border", "envelopes", "probability --motions 4"])
 def test_a_folder_that_cannot_be_made_is_told(
     words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -26,6 +26,16 @@ SEEN = """(() => {
 """How many dots of the large curve are of the ghost's colour."""
 
 
+RED = """[replay.scene.body, replay.scene.ghost.body].map(({ root }) => {
+  let count = 0;
+  root.traverse((item) => {
+    if (item.isMesh) count += item.material.color.getHex() === FLAG_COLOR;
+  });
+  return count > 0;
+})"""
+"""Whether parts of the robot, and of its ghost, are red."""
+
+
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("studio") / "sway.py"
@@ -55,6 +65,7 @@ def test_it_is_seen_beside_ones_own_and_left(tab: Tab, file: Path) -> None:
     assert tab.text("[data-ghost=ghost]") == "Nearest: beside"
     assert tab.text("#badge") == "5 limits broken", "that is one's own"
     assert np.abs(tab.stage() - before).max() > 50.0, "a ghost in the 3D view"
+    assert tab.evaluate(RED) == [True, False], "one's own is red"
     assert curve == 0
     assert tab.evaluate(SEEN) > 20, "a curve beside the margin"
     assert tab.page.locator("#studio-changes button").count() > 0, "changes of all of it, too"
@@ -92,11 +103,12 @@ def test_an_edit_ends_a_proposal(tab: Tab, file: Path) -> None:
 
 def test_a_suggestion_is_seen_before_it_is_taken(tab: Tab, file: Path) -> None:
     _propose(tab)
-    tab.evaluate("studio.nearest.leave()")
+    tab.page.keyboard.press("Escape")
     tab.wait_for(f"{BOX}.hidden && replay.data.ghost === null")
-    before = tab.stage()
     button = tab.page.locator("#studio-changes button").first
-    tab.page.mouse.move(5, 5)
+    tab.page.mouse.move(5, 5)  # where it was, it may point at one of them
+    tab.wait_for("replay.data.ghost === null")
+    before = tab.stage()
     meaning = button.inner_text()
     button.hover()
     tab.wait_for("replay.data.ghost !== null")
@@ -107,7 +119,7 @@ def test_a_suggestion_is_seen_before_it_is_taken(tab: Tab, file: Path) -> None:
     assert tab.text("#badge") == "5 limits broken", "that is one's own"
     tab.page.mouse.move(5, 5)
     tab.wait_for("replay.data.ghost === null")
-    assert np.abs(tab.stage() - before).max() < 2.0
+    assert np.abs(tab.stage() - before).max() < 20.0, "no ghost; a button may fade yet"
     button.focus()
     tab.wait_for("replay.data.ghost !== null")
     assert file.read_text(encoding="utf-8") == SWAY, "it is only looked at"

@@ -16,10 +16,10 @@ class Flags {
     scene.viewer.controls.addEventListener("change", () => this.placeNotes());
   }
 
-  // What is judged is the plan: where the ghost shows it, the ghost turns red.
+  // What is judged is the plan: where the ghost shows it, beside what was measured, that turns red.
   judged() {
     const { ghost } = this.scene;
-    if (!ghost.isShown) return this.parts;
+    if (this.data.header.is_plan || !ghost.isShown) return this.parts;
     this.ghostParts = this.ghostParts || partsOf(ghost.body.root);
     return this.ghostParts;
   }

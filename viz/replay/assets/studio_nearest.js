@@ -60,6 +60,7 @@ class Nearest {
     const { told, diff, data, error } = await studio.post("nearest", {});
     if (studio.editor.base !== base || studio.isBusy) return; // something else was done meanwhile
     if (error) return studio.tell(error, true);
+    this.which = null; // what a resting pointer asked for meanwhile
     studio.player.use(data);
     this.show(told, diff);
   }

@@ -450,8 +450,8 @@ class Studio {
     const isTyping = event.target.matches("input, select, textarea");
     const isCommand = event.ctrlKey || event.metaKey;
     if (document.querySelector("dialog[open]")) return;
-    if (event.key === "Escape" && this.doing.isOn) return void this.doing.cancel();
     if (event.key === "Escape" && this.nearest.isOn) return void this.nearest.leave();
+    if (event.key === "Escape" && this.doing.isOn) return void this.doing.cancel();
     if (event.key === "Escape" && this.selected !== null) return void this.giveUp();
     if (isTyping || (!isCommand && event.altKey)) return;
     const bare = {

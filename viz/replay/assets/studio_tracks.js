@@ -237,12 +237,13 @@ class Tracks {
         this.aim(now.clientX);
         return;
       }
+      const before = values;
       values = this.studio.lengthFor(bar, bar.span[2] + offset / perSecond, SNAP / perSecond);
       const [start, begin] = bar.span;
       this.dragged.end = begin + values[lengthOf(bar).name] / ratio(bar);
       this.place(button, item, [start, begin, this.dragged.end]);
       this.foresee();
-      this.studio.setMany(bar, values, false);
+      if (JSON.stringify(values) !== JSON.stringify(before)) this.studio.setMany(bar, values, false);
     };
     const drop = () => {
       button.removeEventListener("pointermove", move);
