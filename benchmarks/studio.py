@@ -23,7 +23,8 @@ from tests.viz.replay.browsing import Tab, chromium
 EDITS, EDITS_A_DRAG = 200, 20
 LENGTHS = (10, 30, 60)  # [s]
 LEAST_LOAD = 0.05  # s of processor time in a second: less is that of waiting
-REACH = 25  # px to either side of where the end of a bar is taken
+REACH, STEP = 50, 10
+"""How far the end of a bar is dragged, and by how much at a time [px]: its length changes."""
 MOVES = (
     ".body(z={z:.3f}, pitch={angle:.3f}, over={over:.2f})",
     ".body(yaw={angle:.3f}, over={over:.2f}).home(over=0.6)",
@@ -135,7 +136,8 @@ def drag(tab: Tab, rng: np.random.Generator, used: Callable[[], float]) -> Seque
     tab.page.mouse.move(x, y)
     tab.page.mouse.down()
     times = [used()]
-    for offset in (*rng.integers(4, REACH, EDITS_A_DRAG - 1).tolist(), 0):
+    steps = np.cumsum(rng.integers(1, REACH // STEP - 1, EDITS_A_DRAG - 1)) % (REACH // STEP - 1)
+    for offset in (*(STEP * (1 + steps)).tolist(), 0):
         count = tab.evaluate("waits.length")
         tab.page.mouse.move(x + offset, y)
         tab.wait_for(
