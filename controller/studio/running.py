@@ -20,7 +20,8 @@ from go2_wbc.errors import StudioError
 
 LONGEST_WAIT = 10.0
 """Time [s] after which a file is ended that waits, or goes on when its own time is over."""
-LOADED = ("controller.studio.jumping", "controller.studio.making", "viz.replay.page_data")
+PRELOADED = ("controller.studio.jumping", "controller.studio.making", "viz.replay.page_data")
+"""Modules that its processes need, loaded once for all of them."""
 LONGEST_WORK = 120.0  #: Time [s] that solving, checking or playing may take
 
 
@@ -45,7 +46,7 @@ class Runner:
         environment = {**os.environ, **ONE_THREAD}  # more threads would wait for each other, busily
         arguments = (there, self._stop, environment)
         self._process = context.Process(target=serve, args=arguments, daemon=True)
-        start(self._process, *LOADED)
+        start(self._process, *PRELOADED)
         there.close()
         self._is_warm = False
 

@@ -185,10 +185,10 @@ def own_progress(swing: Swing, progress: float) -> float:
 @subroutine
 def is_held_up(swing: Swing, foot: FootContact, clock: Clock, leg: int) -> bool:
     """Whether a foot that the gait waits for rises yet."""
-    stands, elapsed, remaining = foot_phase(clock, leg)
-    if stands or foot.is_early or not swing.is_awaited:
+    if foot.is_early or not swing.is_awaited:
         return False
-    return own_progress(swing, elapsed / (elapsed + remaining)) < swing.peak
+    stands, elapsed, remaining = foot_phase(clock, leg)
+    return not stands and own_progress(swing, elapsed / (elapsed + remaining)) < swing.peak
 
 
 @subroutine

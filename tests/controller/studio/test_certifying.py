@@ -73,8 +73,10 @@ def test_every_run_is_told_and_the_interval_narrows(
     assert len(certified["worst"]) == RUNS
 
 
-@pytest.mark.slow
-def test_the_next_edit_ends_it(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+def counting(
+    studio: Studio, monkeypatch: pytest.MonkeyPatch
+) -> tuple[threading.Thread, list[object]]:
+    """A count of 200 runs that goes on in another thread, and where its answer will be."""
     begun, answers = threading.Event(), list[object]()
     monkeypatch.setattr(
         studio, "_told_of", lambda which, one: begun.set() if which == "certify" else None
@@ -82,6 +84,12 @@ def test_the_next_edit_ends_it(studio: Studio, monkeypatch: pytest.MonkeyPatch) 
     count = threading.Thread(target=lambda: answers.append(studio.certify({"runs": 200})))
     count.start()
     assert begun.wait(60.0)
+    return count, answers
+
+
+@pytest.mark.slow
+def test_the_next_edit_ends_it(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
+    count, answers = counting(studio, monkeypatch)
     editor = read_pack(read_message(studio._server.changes(""), b"")[1])[0]["editor"]
     order = {"op": "set", "site": editor["bars"][0]["site"], "name": "over", "value": 0.6}
     assert isinstance(studio.edit({**order, "base": editor["base"]}), bytes)
@@ -93,13 +101,7 @@ def test_the_next_edit_ends_it(studio: Studio, monkeypatch: pytest.MonkeyPatch) 
 def test_one_that_was_ended_stays_so_when_the_next_begins(
     studio: Studio, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    begun, answers = threading.Event(), list[object]()
-    monkeypatch.setattr(
-        studio, "_told_of", lambda which, one: begun.set() if which == "certify" else None
-    )
-    count = threading.Thread(target=lambda: answers.append(studio.certify({"runs": 200})))
-    count.start()
-    assert begun.wait(60.0)
+    count, answers = counting(studio, monkeypatch)
     studio.cancel({})
     assert "row" in studio.certify({"runs": 1})
     count.join(60.0)
