@@ -1,4 +1,4 @@
-"""One browser for each module of tests that open pages, and no two in a process."""
+"""One browser for all tests here that open pages, and no two in a process."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 OpenPage = Callable[[Recording | ReplayContent], AbstractContextManager[Tab]]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def chromium_browser() -> Iterator[Browser]:
     with chromium() as browser:
         yield browser

@@ -186,6 +186,18 @@ def test_the_numbers_of_a_scale_are_not_cut_off_at_its_ends(browser: Tab) -> Non
     assert all(5 <= y <= 75 for _, y in written)
 
 
+def test_a_peak_of_one_sample_is_drawn_however_many_there_are(browser: Tab) -> None:
+    x, y = "(i) => i / 100", "(i) => (i === 4321 ? -7 : i % 3)"
+    corners = browser.evaluate(
+        "(() => { const seen = []; trace({ lineTo: (...at) => seen.push(at) },"
+        f" 0, 9999, {x}, {y}); return seen; }})()"
+    )
+    assert len(corners) <= 4 * 100, "of a column of pixels"
+    assert [int(x) for x, y in corners if y == -7] == [43]
+    assert {y for _, y in corners} == {-7, 0, 1, 2}
+    assert corners[-1] == [99.99, 0]
+
+
 def test_the_timeline_is_red_where_a_limit_is_broken(browser: Tab) -> None:
     browser.evaluate("replay.scrub(0)")
     browser.evaluate(DRAWN)

@@ -43,10 +43,13 @@ FINDINGS = """(() => {
     return text.startsWith("color(srgb") ? [255 * r, 255 * g, 255 * b, a] : [r, g, b, a];
   };
   const over = ([r, g, b, a], under) => [r, g, b].map((v, k) => a * v + (1 - a) * under[k]);
+  const known = new Map([[null, [255, 255, 255]]]);
   const behind = (e) => {
-    if (!e) return [255, 255, 255];
-    const own = rgba(getComputedStyle(e).backgroundColor);
-    return own[3] === 1 ? own.slice(0, 3) : over(own, behind(e.parentElement));
+    if (!known.has(e)) {
+      const own = rgba(getComputedStyle(e).backgroundColor);
+      known.set(e, own[3] === 1 ? own.slice(0, 3) : over(own, behind(e.parentElement)));
+    }
+    return known.get(e);
   };
   const light = (c) => c.map((v) => v / 255)
     .map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4))

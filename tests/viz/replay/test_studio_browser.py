@@ -51,12 +51,14 @@ def test_an_edge_is_dragged(tab: Tab, file: Path) -> None:
     box, mouse = _bar(tab, 0), tab.page.mouse
     right, middle = box["x"] + box["width"], box["y"] + box["height"] / 2
     second, whole = box["width"] / 0.6, tab.evaluate(TRIANGLES)
+    tab.evaluate("window.rows = [...document.querySelectorAll('.margin')]")
     mouse.move(right - 3, middle)
     mouse.down()
     mouse.move(right - 3 + 0.2 * second, middle, steps=3)
     tab.wait_for(f"{SAID} === 'not saved yet' && Math.abs(replay.data.duration - 3.5) > 0.1")
     assert file.read_text(encoding="utf-8") == GREET, "a draft is not saved"
     assert tab.page.locator("[data-slot=over]").input_value() == "0.8", "numbers follow the hand"
+    assert tab.evaluate("rows.length > 5 && rows.every((row) => row.isConnected)"), "kept"
     assert tab.evaluate(f"{TRIANGLES} < {0.08 * whole}"), (
         "a view that is drawn in software can follow"
     )

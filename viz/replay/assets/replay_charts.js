@@ -9,7 +9,8 @@ const LANE = 9; // px, height of the strip that shows when limits are broken
 const LEG_ALPHA = 0.3; // of a leg's colour behind words
 const LABEL_COLORS = IS_DARK.matches ? ["#2a3346", "#3a4458"] : ["#e6eaf1", "#d5dbe6"]; // neither is a leg's
 
-// A canvas with a picture that is drawn once per size, and a cursor drawn over it.
+// A canvas with a picture that is drawn once for what it shows, and a cursor drawn over it; at most
+// once a frame.
 class TimeCanvas {
   /** @type {HTMLCanvasElement} */ canvas;
   /** @type {ReplayData} */ data;
@@ -17,6 +18,7 @@ class TimeCanvas {
   /** @type {number} */ right;
   /** @type {number} */ time;
   /** @type {Span} */ view;
+  /** @type {string} */ drawn;
 
   constructor(canvas, data, left, right) {
     Object.assign(this, { canvas, data, left, right, time: 0 });
@@ -64,11 +66,23 @@ class TimeCanvas {
 
   show(t) {
     this.time = t;
+    if (this.isAsked) return;
+    this.isAsked = true;
+    requestAnimationFrame(() => this.isAsked && this.paint());
+  }
+
+  // Now: all of it if other data, size or time are shown than were, else the cursor alone.
+  paint() {
+    this.isAsked = false;
     if (!(this.width > 0 && this.height > 0)) return;
+    const { from, length } = this.span;
+    const shown = `${from} ${length}`;
+    if (this.drawn !== shown) this.draw(this.picture.getContext("2d"));
+    this.drawn = shown;
     const paint = this.canvas.getContext("2d");
     paint.clearRect(0, 0, this.width, this.height);
     paint.drawImage(this.picture, 0, 0, this.width, this.height);
-    const x = this.xAt(t);
+    const x = this.xAt(this.time);
     if (x > this.left - 1 && x < this.width - this.right + 1) this.drawCursor(paint, x);
   }
 
@@ -84,7 +98,7 @@ class TimeCanvas {
   }
 
   redraw() {
-    if (this.width > 0 && this.height > 0) this.draw(this.picture.getContext("2d"));
+    this.drawn = null;
     this.show(this.time);
   }
 
@@ -222,10 +236,8 @@ class Timeline extends TimeCanvas {
   }
 
   traceForce(paint, run, k, top, height) {
-    for (let i = 0; i < run.frames; i++) {
-      const share = Math.min(run.forces[4 * i + k] / this.data.header.force_scale, 1);
-      paint.lineTo(this.xAt(i / run.rate), top + height * (1 - share));
-    }
+    const share = (i) => Math.min(run.forces[4 * i + k] / this.data.header.force_scale, 1);
+    trace(paint, 0, run.frames - 1, (i) => this.xAt(i / run.rate), (i) => top + height * (1 - share(i)));
   }
 
   drawAxis(paint, top) {
@@ -310,14 +322,10 @@ class Curve extends TimeCanvas {
     paint.lineWidth = 1.5;
     paint.lineJoin = "round";
     paint.beginPath();
-    let isDown = false;
-    for (let i = 0; i < run.frames; i++) {
-      const value = run[name][i] * scale;
-      if (Number.isFinite(value)) {
-        const [x, y] = [this.xAt(i / run.rate), this.yAt(value)];
-        if (isDown) paint.lineTo(x, y); else paint.moveTo(x, y);
-      }
-      isDown = Number.isFinite(value);
+    const [x, y] = [(i) => this.xAt(i / run.rate), (i) => this.yAt(run[name][i] * scale)];
+    for (const [from, to] of stretches(run.frames, (i) => Number.isFinite(run[name][i]))) {
+      paint.moveTo(x(from), y(from));
+      trace(paint, from, to, x, y);
     }
     paint.stroke();
     paint.lineWidth = 1;
@@ -349,6 +357,25 @@ class Curve extends TimeCanvas {
     paint.arc(x, this.yAt(value), 3.5, 0, 2 * Math.PI);
     paint.fill();
   }
+}
+
+// A line on through the points from one to another: of those in one column of pixels the first, the
+// lowest, the highest and the last, which look as all do.
+function trace(paint, from, to, xAt, yAt) {
+  let [column, low, high, lastX, lastY] = [NaN, 0, 0, 0, 0];
+  const close = () => {
+    if (low < high) for (const y of [low, high, lastY]) paint.lineTo(lastX, y);
+  };
+  for (let i = from; i <= to; i++) {
+    const [x, y] = [xAt(i), yAt(i)];
+    if (Math.floor(x) !== column) {
+      close();
+      paint.lineTo(x, y);
+      [column, low, high] = [Math.floor(x), y, y];
+    }
+    [low, high, lastX, lastY] = [Math.min(low, y), Math.max(high, y), x, y];
+  }
+  close();
 }
 
 // Lines and numbers of a canvas with a scale from `low` to `high`.

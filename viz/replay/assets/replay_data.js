@@ -86,8 +86,8 @@ class ReplayData extends Run {
     this.annotations = this.header.verdict ? this.header.verdict.annotations : [];
     const curvesOf = (verdict, prefix) => (verdict ? verdict.curves : []).map((curve, k) => ({
       ...curve,
+      ...extremes(pack.array(`${prefix}curve${k}.margin`)),
       time: pack.array(`${prefix}curve${k}.time`),
-      margin: pack.array(`${prefix}curve${k}.margin`),
       worst: pack.array(`${prefix}curve${k}.worst`),
     }));
     this.curves = curvesOf(this.header.verdict, "");
@@ -110,6 +110,18 @@ class ReplayData extends Run {
     return this.annotations.filter((annotation) => annotation.is_broken && annotation.spans.some(
       ([from, to]) => t >= from - INSTANT && t <= to + INSTANT));
   }
+}
+
+// A margin with its least value (-Infinity where it is not possible), and the least and largest finite.
+function extremes(margin) {
+  let [least, low, high] = [Infinity, Infinity, -Infinity];
+  for (const value of margin) {
+    if (value < least) least = value;
+    if (!Number.isFinite(value)) continue;
+    if (value < low) low = value;
+    if (value > high) high = value;
+  }
+  return { margin, least, low, high };
 }
 
 const INSTANT = 0.04; // s

@@ -2,6 +2,7 @@
 // The 3D view: meshcat's viewer, moved by the recording. World axes: x forward, y left, z up.
 
 const PATH_SECONDS = 3.0; // how long a foot's path stays visible
+const LEAST_WAY_OF_FOOT = 0.0005; // m between two corners of the path of all of a motion
 const FORCE_SCALE = 0.002; // metres of arrow per newton
 const LEAST_FORCE = 4; // N, weaker forces draw no arrow
 const LIFT = { polygon: 0.0015, outline: 0.002, ring: 0.0015, spot: 0.003 }; // m above the floor
@@ -146,13 +147,17 @@ class RobotScene {
     const { feet, frames, header } = this.data;
     this.paths = this.legs.map((leg, k) => {
       const points = new Float32Array(3 * frames);
-      for (let i = 0; i < frames; i++) points.set(feet.subarray(12 * i + 3 * k, 12 * i + 3 * k + 3), 3 * i);
-      const geometry = new THREE.BufferGeometry();
-      geometry.setAttribute("position", new THREE.BufferAttribute(points, 3));
-      const line = (opacity) => new THREE.Line(geometry.clone(), new THREE.LineBasicMaterial({
-        color: header.leg_colors[k], opacity, transparent: opacity < 1,
-      }));
-      const [late, whole] = [line(1), line(0.3)];
+      const way = []; // a foot that stands adds nothing to it
+      let last = [Infinity, 0, 0];
+      for (let i = 0; i < frames; i++) {
+        const [x, y, z] = feet.subarray(12 * i + 3 * k, 12 * i + 3 * k + 3);
+        points.set([x, y, z], 3 * i);
+        if (Math.hypot(x - last[0], y - last[1], z - last[2]) > LEAST_WAY_OF_FOOT) way.push(...last = [x, y, z]);
+      }
+      const line = (corners, opacity) => new THREE.Line(
+        new THREE.BufferGeometry().setAttribute("position", new THREE.BufferAttribute(corners, 3)),
+        new THREE.LineBasicMaterial({ color: header.leg_colors[k], opacity, transparent: opacity < 1 }));
+      const [late, whole] = [line(points, 1), line(new Float32Array(way), 0.3)];
       whole.visible = header.verdict !== null;
       for (const item of [late, whole]) item.frustumCulled = false;
       this.viewer.set_object(["meshcat", "paths", leg, "late"], late);

@@ -31,8 +31,13 @@ class VerdictPanel {
     showTrust(verdict);
     this.list.replaceChildren(...data.annotations.map((annotation) => this.annotationRow(annotation)));
     if (!data.annotations.length) this.list.append(plainText("li", "No limit is broken, no margin is tight.", "calm"));
-    this.sparks = data.curves.map((curve) => new MarginRow(data, curve, () => this.choose(curve.name), this.onJump));
-    this.rows.replaceChildren(...this.sparks.map((spark) => spark.row));
+    const known = new Map(this.sparks?.map((spark) => [spark.curve.name, spark]));
+    this.sparks = data.curves.map((curve) => known.get(curve.name) ?? new MarginRow(curve.name, (name) => this.choose(name), this.onJump));
+    this.sparks.forEach((spark, k) => {
+      spark.use(data, data.curves[k]);
+      if (this.rows.children[k] !== spark.row) this.rows.insertBefore(spark.row, this.rows.children[k] ?? null);
+    });
+    while (this.rows.children.length > this.sparks.length) this.rows.lastChild.remove();
     const kept = data.curves.find((curve) => curve.name === this.chosen);
     const isWorse = data.curves.length && isBroken(data.curves[0]) && !(kept && isBroken(kept));
     this.choose(kept && !isWorse ? kept.name : (data.curves[0] || {}).name);
@@ -102,28 +107,32 @@ class VerdictPanel {
 
 // One line of the list of limits: name, least margin, small curve.
 class MarginRow {
-  constructor(data, curve, onChoose, onJump) {
-    this.curve = curve;
+  /** @type {any} */ curve;
+
+  constructor(name, onChoose, onJump) {
     this.row = document.createElement("div");
-    this.row.className = `margin ${rank(curve)}`;
     const button = document.createElement("button");
     button.title = "Show this one large";
-    const least = leastOf(curve);
-    button.append(
-      plainText("b", curve.name),
-      plainText("span", Number.isFinite(least) ? leftOver(least, curve.unit) : "not possible"));
+    this.least = plainText("span", "");
+    button.append(plainText("b", name), this.least);
     button.addEventListener("click", () => {
-      onChoose();
+      onChoose(name);
       button.blur();
     });
     const canvas = document.createElement("canvas");
     this.row.append(button, canvas);
-    this.canvas = new MarginCurve(canvas, data, false);
-    this.canvas.draws(data, curve);
+    this.canvas = new MarginCurve(canvas, null, false);
     this.canvas.onScrub((t) => {
-      onChoose();
+      onChoose(name);
       onJump(t);
     });
+  }
+
+  use(data, curve) {
+    this.curve = curve;
+    this.row.className = `margin ${rank(curve)}`;
+    this.least.textContent = Number.isFinite(curve.least) ? leftOver(curve.least, curve.unit) : "not possible";
+    this.canvas.draws(data, curve);
   }
 
   show(t) {
@@ -141,8 +150,9 @@ class MarginCurve extends TimeCanvas {
   draws(data, curve) {
     this.curve = curve;
     this.other = data.proposed?.get(curve.name);
-    const finite = [curve, this.other].flatMap((one) => Array.from(one?.margin ?? [])).filter(Number.isFinite);
-    const high = Math.max(...finite, 1e-9), low = Math.min(...finite, 0);
+    const both = [curve, this.other ?? curve];
+    const high = Math.max(...both.map((one) => one.high), 1e-9);
+    const low = Math.min(...both.map((one) => one.low), 0);
     const span = high - low;
     this.high = high + 0.08 * span;
     this.low = Math.min(low - 0.08 * span, -ZERO_SHARE / (1 - ZERO_SHARE) * this.high);
@@ -196,19 +206,19 @@ class MarginCurve extends TimeCanvas {
     paint.strokeStyle = paint.fillStyle = color;
     paint.lineWidth = this.isLarge ? 1.6 : 1.2;
     paint.lineJoin = "round";
-    const known = (i) => Number.isFinite(margin[i]);
-    const isJoined = (i) => time.length > 2 && known(i) && known(i + 1);
+    const isKnown = (i) => Number.isFinite(margin[i]);
+    const [x, y] = [(i) => this.xAt(time[i]), (i) => this.yAt(margin[i])];
+    const alone = (i) => time.length < 3 || !(isKnown(i - 1) || isKnown(i + 1));
     paint.beginPath();
-    for (let i = 0; i < time.length; i++) {
-      if (!isJoined(i)) continue;
-      if (!isJoined(i - 1)) paint.moveTo(this.xAt(time[i]), this.yAt(margin[i]));
-      paint.lineTo(this.xAt(time[i + 1]), this.yAt(margin[i + 1]));
+    for (const [from, to] of stretches(time.length, (i) => isKnown(i) && !alone(i))) {
+      paint.moveTo(x(from), y(from));
+      trace(paint, from, to, x, y);
     }
     paint.stroke();
     for (let i = 0; i < time.length; i++) {
-      if (!known(i) || isJoined(i) || isJoined(i - 1)) continue;
+      if (!isKnown(i) || !alone(i)) continue;
       paint.beginPath();
-      paint.arc(this.xAt(time[i]), this.yAt(margin[i]), this.isLarge ? 3 : 2, 0, 2 * Math.PI);
+      paint.arc(x(i), y(i), this.isLarge ? 3 : 2, 0, 2 * Math.PI);
       paint.fill();
     }
   }
@@ -221,17 +231,13 @@ class MarginCurve extends TimeCanvas {
   }
 }
 
-function leastOf(curve) {
-  return Array.from(curve.margin).filter((v) => !Number.isNaN(v)).reduce((a, b) => Math.min(a, b), Infinity);
-}
-
 function isBroken(curve) {
-  return leastOf(curve) < 0;
+  return curve.least < 0;
 }
 
 function rank(curve) {
   if (isBroken(curve)) return "broken";
-  return leastOf(curve) < curve.tight ? "tight" : "fine";
+  return curve.least < curve.tight ? "tight" : "fine";
 }
 
 function nearest(times, t) {

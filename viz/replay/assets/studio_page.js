@@ -94,8 +94,8 @@ class Studio {
   }
 
   drawTime() {
-    for (const chart of this.charts) chart.redraw();
-    this.tracks.draw();
+    for (const chart of this.charts) chart.paint();
+    this.tracks.follow();
     this.music.draw();
   }
 

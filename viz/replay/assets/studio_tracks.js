@@ -17,6 +17,7 @@ class Tracks {
   /** @type {{ bar: Bar, index: number, lane: string, row: number, next: number }[]} */ items;
   /** @type {{ index: number, end?: number }} */ dragged;
   /** @type {number} */ goal;
+  /** @type {string} */ drawn;
 
   constructor(studio, view) {
     Object.assign(this, { studio, view, items: [], made: new Map(), dragged: null });
@@ -93,8 +94,15 @@ class Tracks {
     return (t - this.view.from) / this.view.length * this.width;
   }
 
+  // To another part of the time.
+  follow() {
+    const { from, length } = this.view;
+    if (this.drawn !== `${from} ${length}`) this.draw();
+  }
+
   draw() {
     if (!this.data) return;
+    this.drawn = `${this.view.from} ${this.view.length}`;
     this.measure();
     const { width } = this;
     const seen = new Set();
