@@ -8,7 +8,7 @@ it, or on those of its names. What hangs on none is computed.
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -43,7 +43,6 @@ MEMBERS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 DEEPEST = 6  #: Names of names that are followed
 MOST_STEPS = 100  #: from name to name, of one argument: a field may stand for itself
 COMPUTED = "it is computed: change it in the file"
-_SCOPES = (ast.FunctionDef, ast.Lambda, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 
 
 @dataclass(frozen=True, slots=True)
@@ -320,9 +319,7 @@ class _Finder:
 
     def _bindings(self, scope: ast.AST, name: str, call: ast.AST, run: Run) -> list[_Bound]:
         is_module, found = scope is self._syntax.tree, list[_Bound]()
-        for node in _within(scope):
-            if not isinstance(node, ast.Name) or (node.id, type(node.ctx)) != (name, ast.Store):
-                continue
+        for node in self._syntax.stored(scope).get(name, ()):
             if is_module and self._syntax.parents[self._syntax.statement(node)] is not scope:
                 continue
             value = self._assigned(node, call, run)
@@ -414,11 +411,3 @@ def _is_member(node: ast.expr) -> bool:
         and isinstance(node.value, ast.Name)
         and node.attr in MEMBERS.get(node.value.id, ())
     )
-
-
-def _within(scope: ast.AST) -> Iterator[ast.AST]:
-    """The nodes of a scope, without those of the scopes in it."""
-    for child in ast.iter_child_nodes(scope):
-        yield child
-        if not isinstance(child, _SCOPES):
-            yield from _within(child)

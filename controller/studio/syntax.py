@@ -7,7 +7,7 @@ import io
 import re
 import tokenize
 from bisect import bisect_right
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cached_property, lru_cache
@@ -15,6 +15,7 @@ from functools import cached_property, lru_cache
 from go2_wbc.errors import StudioError
 
 MODULE = "motions"  #: whose functions an author uses
+_SCOPES = (ast.FunctionDef, ast.Lambda, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 Site = tuple[int, int]  #: line from 1 and column [bytes] from 0 at which a call ends
 Span = tuple[int, int]  #: first byte, and the first after it
 
@@ -50,6 +51,16 @@ class Syntax:
         bom = 3 if data.startswith(b"\xef\xbb\xbf") else 0
         ends = [match.end() for match in re.finditer(rb"\r\n|\r|\n", data)]
         self.starts = [bom, *ends]
+        self._stored = dict[ast.AST, dict[str, list[ast.Name]]]()
+
+    def stored(self, scope: ast.AST) -> dict[str, list[ast.Name]]:
+        """Where the names of a scope are set, without those of the scopes in it."""
+        if scope not in self._stored:
+            found = self._stored[scope] = defaultdict[str, list[ast.Name]](list)
+            for node in _within(scope):
+                if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                    found[node.id].append(node)
+        return self._stored[scope]
 
     @cached_property
     def nodes(self) -> list[ast.AST]:
@@ -127,6 +138,14 @@ class Syntax:
     def line_end(self) -> str:
         """As the file has it."""
         return "\r\n" if b"\r\n" in self.data else "\n"
+
+
+def _within(scope: ast.AST) -> Iterator[ast.AST]:
+    """The nodes of a scope, without those of the scopes in it."""
+    for child in ast.iter_child_nodes(scope):
+        yield child
+        if not isinstance(child, _SCOPES):
+            yield from _within(child)
 
 
 @lru_cache(maxsize=8)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from controller.studio import session
+from controller.studio import searching, session
 from motions import FeasibilityChecker, Timeline
 from tests.viz.replay.browsing import Tab
 from tests.viz.replay.studio_tab import SETTLED
@@ -16,6 +16,7 @@ pytestmark = pytest.mark.slow
 SAID = "document.getElementById('studio-say').textContent"
 DOING = "document.getElementById('studio-doing')"
 TOO_HIGH = 0.297  #: m, which no one else asks for: that there is no plan is kept
+STEP = 0.03  #: m, as near as the highest jump is looked for here; the studio's own is 0.01
 SOLVED, TRIED = 2.0, 1.0  #: s of work; the studio's own take three times as long
 LEAP = '''"""Leaps."""
 
@@ -37,6 +38,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(session, "LONGEST_SOLVE", SOLVED)
         patch.setattr(session, "LONGEST_TRY", TRIED)
+        patch.setattr(searching, "FINEST", (STEP, 1.0))
         yield path
 
 
