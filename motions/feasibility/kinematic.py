@@ -181,13 +181,9 @@ def landing(case: Case) -> tuple[Series, Series, Series]:
         away[row, leg] = np.linalg.norm(places[row, leg] - motion.p_feet[standing, leg])
         speed[row, leg] = paces[max(row - 1, 0), leg] if lands else 0.0
         if lands:
-            last = np.flatnonzero(stands[: edge + 1, leg])
-            since = slice(int(last[-1]) if len(last) else 0, edge + 1)
-            flat[row, leg] = _left_to_go(
-                places[since, leg] - motion.p_feet[standing, leg],
-                stands[since, leg],
-                FAST * (times[1] - times[0]),
-            )
+            left = places[:standing, leg] - motion.p_feet[standing, leg]
+            fast = FAST * (times[1] - times[0])
+            flat[row, leg] = _left_to_go(left, stands[:standing, leg], fast)
     return (
         case.series("landing place", "m", FEET, away, limits.landing),
         case.series("flat landing", "m", FEET, flat, limits.flat_landing),

@@ -64,6 +64,7 @@ def test_a_motion_that_is_done_is_certified_with_its_interval(bows: Certificate)
     assert (bows.motion, bows.n, bows.done, bows.rate) == ("bow", 4, 4, 1.0)
     assert bows.interval == pytest.approx((0.025 ** (1 / 4), 1.0))  # Clopper-Pearson, n of n
     assert bows.meets(0.39)
+    assert bows.meets(bows.interval[0])
     assert not bows.meets(0.4)
     assert {"code", "version", "plan", "libraries"} <= set(bows.about)
     assert len({row["friction"] for row in bows.worst}) == 4

@@ -26,10 +26,15 @@ from go2_wbc.planning.trunk import (
     PoseConfig,
     PoseEnvelope,
     Trunk,
+    accelerate,
     advance_pose,
     fill_body,
+    follow_heading,
+    follow_position,
+    gained,
     level,
     pose_turn,
+    ramp,
 )
 from go2_wbc.planning.walk import Planner, Walk
 from go2_wbc.reference import Reference, Target
@@ -59,6 +64,55 @@ def test_a_trunk_on_a_slope_keeps_its_heading_and_has_its_normal_up() -> None:
     np.testing.assert_allclose(R[:, 2], np.array([-0.2, 0.1, 1.0]) / np.sqrt(1.05), atol=EXACT)
     assert np.arctan2(R[1, 0], R[0, 0]) == pytest.approx(0.7, abs=EXACT)
     np.testing.assert_allclose(attitude(0.7, np.zeros(2)), yaw_rotation(0.7), atol=EXACT)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_command_is_ramped_straight_to_at_the_rates_and_arrives(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    v, command = rng.uniform(-1.0, 1.0, 3), Command(velocity=rng.uniform(-1.0, 1.0, 3))
+    for _ in range(int(3.0 / TICK)):
+        before = v.copy()
+        missing = command.velocity - before
+        ramp(v, command, 1.5, 4.0, TICK)
+        far = math.hypot(*missing[:2])
+        step = missing[:2] * min(1.5 * TICK / far, 1.0) if far > EXACT else missing[:2]
+        np.testing.assert_allclose(v[:2] - before[:2], step, atol=EXACT)
+        assert v[2] - before[2] == pytest.approx(np.clip(missing[2], -4 * TICK, 4 * TICK))
+    np.testing.assert_allclose(v, command.velocity, atol=EXACT)
+
+
+def test_what_the_ramp_adds_is_foretold() -> None:
+    trunk, command = Trunk(), Command(velocity=np.array([3.0, -4.0, 0.0]))
+    accelerate(trunk, command, 2.0, 1.0, 0.5)  # so long that the smoothed rate is the ramp's
+    np.testing.assert_allclose(trunk.acceleration, [1.2, -1.6])
+    np.testing.assert_allclose(trunk.missing, command.velocity[:2] - trunk.velocity[:2])
+    lasts = 4.0 / 2.0  # for what is missing
+    for axis, time in ((0, 0.2), (0, 2.9), (1, 0.4), (1, 5.0)):
+        t = np.linspace(0.0, time, 20001)
+        v = trunk.acceleration[axis] * np.minimum(t, lasts)
+        found = gained(trunk, axis, time)
+        assert found == pytest.approx((v[-1], np.trapezoid(v, t)), rel=1e-6)
+    trunk.missing[0] = -0.1
+    assert gained(trunk, 0, 1.0) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("yaw", [-3.1, 0.4, 3.1])
+def test_the_trunk_s_way_is_integrated_and_never_farther_ahead_than_the_leash(yaw: float) -> None:
+    q = standing_q()
+    q[3:7] = pin.Quaternion(yaw_rotation(yaw)).coeffs()
+    now = MODEL.snapshot(state_of(q))
+    com = now.p_world_com[:2]
+    trunk = Trunk(velocity=np.array([0.5, -0.2, 0.7]), pose=np.array([0.0, 0.0, 0.0, 0.03]))
+    way = (yaw_rotation(yaw) @ [0.05, -0.02, 0.0])[:2]
+    for leash, share, ahead in ((0.5, 1.0, 0.1), (0.02, 0.02 / np.linalg.norm(way), 0.02)):
+        trunk.yaw, trunk.position[:] = yaw, com
+        follow_position(trunk, now, leash, 0.1)
+        np.testing.assert_allclose(trunk.position, com + share * way, atol=EXACT)
+        follow_heading(trunk, now, leash, 0.1)
+        assert trunk.yaw + 0.03 - yaw == pytest.approx(ahead, abs=EXACT)  # the pose turns it, too
+    trunk.yaw = yaw + 2.0 * np.pi - 0.4
+    follow_heading(trunk, now, 0.25, 0.0)
+    assert trunk.yaw == pytest.approx(yaw + 2.0 * np.pi - 0.28)
 
 
 @pytest.mark.parametrize("slope", [(0.0, 0.3), (0.3, 0.0)])

@@ -326,6 +326,16 @@ def test_joints_hold_a_foot_that_lacks_little(
         assert (series.values[:, 0].max() > 0.1) == slides
 
 
+def test_a_foot_that_creeps_goes_that_speed_times_the_time(
+    resting: Trajectory, model: RobotModel
+) -> None:
+    stands = np.ones((len(resting.times), 4), dtype=bool)
+    creeps = np.tile([0.03, -0.04], (*stands.shape, 1))
+    case = case_of(resting, model, forces_of(resting, model))
+    speeds = np.diff(slip(case, creeps, stands).values, axis=0) / np.diff(resting.times)[:, None]
+    np.testing.assert_allclose(speeds, 0.05, rtol=1e-6)
+
+
 def test_a_lasting_push_is_held_by_the_gains_and_a_short_one_forgotten() -> None:
     pushes = np.zeros((4000, 2))
     pushes[:, 0], pushes[:10, 1] = 2.0, 2.0
