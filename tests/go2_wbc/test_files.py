@@ -22,6 +22,8 @@ def test_a_file_is_replaced_whole_in_folders_that_are_made_and_none_is_a_folder(
     assert write_atomically(target, b"new") == target
     assert target.read_bytes() == b"new"
     assert list(target.parent.iterdir()) == [target]
+    with pytest.raises(ConfigError, match=r"demo\.html: File exists; choose a folder"):
+        checked_output(target / "demo.html", (".html",))
 
 
 def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(

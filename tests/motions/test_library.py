@@ -91,6 +91,16 @@ def test_a_foot_is_unloaded_before_it_lifts_and_loaded_only_after_it_lands(name:
     assert change[written].max() < 1.01 * 0.005 / plan.ramp * loads.max()
 
 
+@pytest.mark.parametrize(
+    ("name", "turns"),
+    [("bow_and_turn", 1), ("march", 2), ("patrol", 2), ("pirouette", 2)],
+)
+def test_an_about_turn_ends_along_the_line_on_which_it_began(name: str, turns: int) -> None:
+    plan = library_plan(name)
+    ahead = [plan.at(t).body.R_world_base[:2, 0] for t in (0.0, plan.duration)]
+    np.testing.assert_allclose(ahead[1], (-1) ** turns * ahead[0], atol=1e-3)
+
+
 def within_dynamic(plan: CompiledPlan, t: float) -> bool:
     return any(span.start - STEP <= t <= span.end + STEP for span in plan.dynamic)
 

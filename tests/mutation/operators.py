@@ -101,6 +101,8 @@ def _is_talk(node: ast.AST) -> bool:
     match node:
         case ast.Raise() | ast.JoinedStr() | ast.Assert():
             return True
+        case ast.keyword(arg="strict"):  # of ``zip``: an assertion
+            return True
         case ast.Call(func=ast.Attribute(value=ast.Name(id=name))):
             return name in _LOGGERS
     return False

@@ -45,6 +45,7 @@ def speak(n: Literal[1], size: int = 2) -> str | None:
     _log.info("no %d", n + 1)
     if not n:
         raise ValueError(n + 1)
+    zip("ab", "cd", strict=True)
     return f"{n + 1}"
 """
 
