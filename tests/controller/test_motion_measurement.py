@@ -12,6 +12,7 @@ from controller.motion_measurement import (
     FELL,
     LANDED,
     SETTLED_CONTACT,
+    _landed_off,
     _slip,
     failures_of,
     measure_motion,
@@ -146,6 +147,12 @@ def test_a_foot_counts_as_a_paw_in_the_air_and_as_landed_once_it_has_settled(
     late[down : down + round(0.5 * LANDED / PERIOD), Leg.FR, 2] += SHIFT
     found = off_written(replace(truth, p_world_feet=late), raised, model)
     assert found == pytest.approx([0.0, 0.0, 0.0, 0.0], abs=1e-6)
+
+
+def test_a_foot_that_has_stood_all_along_has_not_landed() -> None:
+    times, stance, off = np.arange(300) * PERIOD, np.ones((300, 4), dtype=bool), np.zeros((300, 4))
+    stance[0, Leg.FL], off[:, Leg.FL], off[:, Leg.FR] = False, 0.01, 0.02
+    assert _landed_off(times, stance, off) == 0.01
 
 
 def test_a_jump_is_compared_with_where_it_was_to_land(model: RobotModel) -> None:

@@ -1,6 +1,7 @@
 """The ways between postures start where the robot is and end where they say."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,15 @@ from go2_wbc.reference import LegTask, TrackedPoint
 from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rotation_from_rpy, yaw_rotation
-from motions.postures import NORMAL_FORCE_MAX, PosturePlan, lie_down, rise, sit_down, sit_raise
+from motions.postures import (
+    NORMAL_FORCE_MAX,
+    PosturePlan,
+    lean,
+    lie_down,
+    rise,
+    sit_down,
+    sit_raise,
+)
 from tests.engine_helpers import angular_velocity_from_rpy
 
 STAND_POSE = find_profile().stand_pose
@@ -61,6 +70,18 @@ def test_a_sitting_robot_keeps_its_rear_legs_off_the_singularity_of_their_hips(
     p_hips_feet = (feet - pose.p_world) @ rotation_from_rpy(*SIT_POSE[3:]) - model.p_base_hips
     distance = np.linalg.norm(p_hips_feet[2:, 1:], axis=1)
     assert np.sqrt(distance.min() ** 2 - model.hip_width**2) > LEAST_REACH
+
+
+def test_a_posture_is_that_of_the_robot_that_takes_it() -> None:
+    tall = replace(find_profile(), stand_height=0.35, sit=(0.3, -0.4), lie_height=0.12)
+    plans = (
+        rise(START, Posture.LIE, profile=tall),
+        lean(START, np.zeros(3), profile=tall),
+        sit_down(START, profile=tall),
+        lie_down(START, profile=tall),
+    )
+    ends = [plan.at(plan.duration).body.p_world[2] for plan in plans]
+    assert ends == pytest.approx([0.35, 0.35, 0.3, 0.12])
 
 
 def test_the_stance_in_which_a_rise_starts_is_the_one_that_was_given() -> None:

@@ -20,6 +20,7 @@ def test_a_motion_is_recorded_and_told_of_in_words_or_as_json(
     told = run(*words)
     assert "1 episode, 0 falls, in bow.parquet" in told.out
     assert "1/1" in told.err
+    assert [file.name for file in Path("bow.parquet").iterdir()] == ["episode-000000000.parquet"]
     found = read_dataset(tmp_path / "bow.parquet")
     values = json.loads(run(*words, "--json").out)
     assert values["file"] == str(tmp_path / "bow.parquet")

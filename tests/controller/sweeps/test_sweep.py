@@ -1,5 +1,6 @@
 """A sweep gives every row once, whatever carries it, ends it, or goes wrong in it."""
 
+import math
 import os
 import random
 import signal
@@ -67,6 +68,7 @@ def test_more_seeds_add_to_what_is_there_fewer_take_of_it_and_fresh_begins_anew(
     assert {row["pid"] for row in later.rows[4:]}.isdisjoint(row["pid"] for row in first)
     assert [progress.done for progress in told] == [4, 5, 6]
     assert (told[0].rate, told[0].share, told[-1].remaining) == (0.0, 4 / 6, 0.0)
+    assert (told[0].remaining, told[1].remaining) == (math.inf, 1 / told[1].rate)
     sweep(swept.trial, 6, workers=1, out=out, fresh=True)
     again = sweep(swept.trial, 2, first_seed=3, workers=1, out=out)
     assert [row["seed"] for row in again.rows] == [3, 4]
