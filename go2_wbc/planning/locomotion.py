@@ -80,6 +80,7 @@ from go2_wbc.planning.trunk import (
     fill_body,
     follow_heading,
     follow_position,
+    give_way,
     is_settled,
     is_zero,
     level,
@@ -136,11 +137,10 @@ def hurry(now: Snapshot, s: Planner, c: Walk) -> float:
 @subroutine
 def is_waiting(s: Planner) -> bool:
     """Whether the gait waits for a foot."""
+    waits = False
     for leg in range(4):
-        foot = s.feet[leg]
-        if is_held_up(foot.swing, foot.contact, s.clock, leg):
-            return True
-    return False
+        waits = waits or is_held_up(s.feet[leg].swing, s.feet[leg].contact, s.clock, leg)
+    return waits
 
 
 @subroutine
@@ -175,6 +175,8 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
     """Ramp velocity and pose, integrate to the place, apply the leash, correct the height."""
     trunk, config = s.trunk, c.config
     advance_pose(trunk.pose, trunk.pose_rate, config.pose, command.pose, dt)
+    if s.clock.is_waiting:
+        give_way(trunk, now)
     linear = haste(s.ground, s.slip.friction, s.delay, trunk.velocity) * config.linear_acceleration
     accelerate(trunk, command, linear, config.angular_acceleration, dt)
     follow_heading(trunk, now, config.yaw_leash, dt)
@@ -221,7 +223,8 @@ def note_liftoffs(
     learn_ground(s.ground, now, c.foot_radius, met, s.delay)
     if stumbles.any():
         note_stumble(s.ground)
-    is_fast = np.hypot(s.trunk.velocity[0], s.trunk.velocity[1]) > c.config.rough.speed + TIE
+    speed = np.hypot(s.trunk.velocity[0], s.trunk.velocity[1])
+    is_fast = s.clock.is_waiting or speed > c.config.rough.speed + TIE
     for leg in range(4):
         if stumbles[leg]:
             resume_swing(s.feet[leg].swing, leg, now, s.ground, progress[leg], is_fast)
@@ -308,8 +311,7 @@ def plan(
         swing = s.feet[leg].swing
         own = own_progress(swing, progress[leg]) if swing.is_awaited else progress[leg]
         stands[leg] = follow_contact(foot, above, contact[leg], stance[leg], own, dt)
-    steps, beside = s.is_stepping, c.stands_beside_com
-    observe_slip(s.slip, now, contact, tau, stands, steps, beside, dt)
+    observe_slip(s.slip, now, contact, tau, stands, s.is_stepping, c.stands_beside_com, dt)
     note_liftoffs(now, s, c, contact, stance, progress)
     target.friction = level_friction(s.ground, s.slip.friction, LEAST_FRICTION)
     fill_body(s.trunk, s.ground, carried_height(s, c), target)
@@ -458,8 +460,7 @@ class LocomotionPlanner:
     @typed(late=True)
     def square_up(self, snapshot: Snapshot) -> bool:
         """Start stepping unless every foot is below its hip; returns whether they all are."""
-        is_done = bool(is_square(snapshot, self._state, self._walk))
-        if not is_done:
+        if not (is_done := bool(is_square(snapshot, self._state, self._walk))):
             start_stepping(self._state, self._walk)
         return is_done
 

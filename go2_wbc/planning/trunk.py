@@ -274,6 +274,16 @@ def accelerate(trunk: Trunk, command: Command, linear: float, angular: float, dt
 
 
 @subroutine
+def give_way(trunk: Trunk, now: Snapshot) -> None:
+    """Take the robot's own speed on its way, if that is less: it has been stopped."""
+    x, y = world_velocity(trunk)
+    along = x * now.v_world_com[0] + y * now.v_world_com[1]
+    share = min(max(along / max(x * x + y * y, _TINY), 0.0), 1.0)
+    trunk.velocity[0] *= share
+    trunk.velocity[1] *= share
+
+
+@subroutine
 def gained(trunk: Trunk, axis: int, time: float) -> tuple[float, float]:
     """Velocity [m/s] that the ramp adds along an axis within a ``time`` [s], and the way [m]."""
     missing, a = trunk.missing[axis], trunk.acceleration[axis]

@@ -210,14 +210,19 @@ def test_a_foot_that_was_stopped_rises_well_above_and_comes_down_well_beyond_tha
 HIGH = 0.05  # m of a foot above the ground when it may have come onto a step
 
 
-def stopped(speed: float, *, presses: bool = False) -> tuple[list[Reference], float]:
+def stopped(
+    speed: float, *, presses: bool = False, own: float = 0.0
+) -> tuple[list[Reference], float]:
     """A first swing of a robot told to go at ``speed``, in which a foot is stopped.
+
+    It goes at its ``own`` [m/s].
 
     Returns its references from there on, and the time [s] at which the foot stands. If it
     ``presses`` it touches the step again, high above the ground, as soon as others may land.
     """
     model = helpers.symmetric_model()
-    start = model.snapshot(helpers.state_of(helpers.standing_q()))
+    moving = np.array([own, *np.zeros(17)])
+    start = model.snapshot(helpers.state_of(helpers.standing_q(), moving))
     planner, found = LocomotionPlanner(model, GAITS["trot"], LocomotionConfig()), []
     planner.start(start, friction=0.6)
     planner._state.ground.height -= HIGH
@@ -251,6 +256,18 @@ def test_a_face_that_a_foot_touches_as_it_rises_along_it_is_no_landing() -> None
     begun = STUMBLE * TICK
     risen = begun + 0.5 * (SWING - begun) / WAITING
     assert landed == pytest.approx(risen + (EARLIEST - 0.5) * (SWING - begun), abs=0.01)
+
+
+@pytest.mark.parametrize(("told", "own"), [(1.0, 0.3), (1.0, 2.0), (0.5, 0.3)])
+def test_a_fast_robot_that_was_stopped_is_asked_for_the_speed_that_it_has_left(
+    told: float, own: float
+) -> None:
+    asked = [one.body.v_world[0] for one in stopped(told, own=own)[0]]
+    if told > LocomotionConfig().rough.speed and own < told:
+        assert asked[9] == pytest.approx(own, abs=0.02)
+        assert asked[-1] > own + 0.01  # it speeds up again as it goes on
+    else:
+        assert asked[9] > 0.4
 
 
 @dataclass
