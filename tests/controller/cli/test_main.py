@@ -125,8 +125,12 @@ def test_a_command_that_cannot_be_imported_does_not_stop_the_others(
     assert "go2-wbc doctor" in run("broken", code=ExitCode.RUNTIME).err
 
 
-def test_without_a_command_there_is_the_help_and_the_version_if_it_is_asked_for(run: Run) -> None:
-    assert run("--version").out.startswith("go2-wbc ")
+def test_without_a_command_there_is_the_help_and_the_version_if_it_is_asked_for(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for version, told in (("7.1", "7.1"), (None, "(not installed)")):
+        monkeypatch.setattr("controller.cli.main.installed_version", lambda _, known=version: known)
+        assert run("--version").out.strip() == f"go2-wbc {told}"
     assert "usage: go2-wbc" in run(code=USAGE).err
 
 

@@ -1,17 +1,55 @@
 """What a robot that lives on its own sensors is given: late, in steps, biased."""
 
+from dataclasses import replace
+
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from go2_wbc.errors import ConfigError
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.plant.sensors import SensorErrors
+from go2_wbc.plant.sensors import ImuSample, SensorErrors, SensorNoise
+from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 from go2_wbc.robot.state import JointCommand
+from tests.engine_helpers import standing_q, state_of
 from tests.go2_wbc.plant.helpers import STAND
 
 NONE = dict.fromkeys(SensorErrors.__slots__, 0.0)
 SERVO = JointCommand.servo(STAND, np.zeros(12), 60.0, 3.0)
 TICKS = 30
+
+
+def test_noise_has_no_mean_and_the_deviation_that_is_given() -> None:
+    noise, rng, n = SensorNoise(), np.random.default_rng(0), 600
+    q = standing_q()
+    q[3:7] = pin.Quaternion(rotation_from_rpy(0.3, -0.2, 2.5)).coeffs()
+    true = replace(state_of(q), foot_forces=np.full(4, 40.0))
+    imu = ImuSample(q[3:7], np.array([0.1, 0.2, -0.3]), np.array([0.0, 1.0, 9.8]))
+    seen = [noise.corrupt_state(true, rng) for _ in range(n)]
+    felt = [noise.corrupt_imu(imu, rng) for _ in range(n)]
+    q_off, v_off = (np.array([getattr(s, x) - getattr(true, x) for s in seen]) for x in "qv")
+    off = np.array([[s.gyro - imu.gyro, s.accelerometer - imu.accelerometer] for s in felt])
+    attitudes = [s.q[3:7] for s in seen], [s.quaternion for s in felt]
+    for found in attitudes:
+        turns = [pin.Quaternion(xyzw).matrix() for xyzw in found]
+        turned = [log_rotation(true.R_world_base.T @ R) for R in turns]
+        assert_deviates(np.array(turned), noise.orientation)
+        np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0)
+    assert_deviates(q_off[:, :3], noise.position)
+    assert_deviates(q_off[:, 7:], noise.joint_position)
+    assert_deviates(v_off[:, :3], noise.linear_velocity)
+    assert_deviates(v_off[:, 3:6], noise.gyro)
+    assert_deviates(v_off[:, 6:], noise.joint_velocity)
+    assert_deviates(off[:, 0], noise.gyro)
+    assert_deviates(off[:, 1], noise.accelerometer)
+    assert_deviates(np.array([s.foot_forces for s in seen]) - 40.0, noise.foot_force)
+
+
+def assert_deviates(errors: np.ndarray, deviation: float) -> None:
+    """Within five deviations of what a sample of that size finds itself."""
+    n = len(errors)
+    assert np.abs(errors.mean(axis=0)).max() < 5.0 * deviation / np.sqrt(n)
+    assert errors.std(axis=0) == pytest.approx(deviation, rel=5.0 / np.sqrt(2.0 * n))
 
 
 def test_a_negative_error_is_refused() -> None:

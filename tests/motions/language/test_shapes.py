@@ -11,7 +11,7 @@ from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.rotations import yaw_rotation
 from motions import FeasibilityChecker, Timeline, deg, load_motion
 from motions.language.footing import Footing
-from motions.language.keys import BodyKey, JointKey, PhaseKey
+from motions.language.keys import BalanceShift, BodyKey, JointKey, PhaseKey
 from motions.plan.trajectory import trajectory_of
 from motions.postures import standing_feet
 from tests.motions.plans import MODEL, curves_at, plan_of
@@ -96,6 +96,13 @@ def test_a_slower_motion_passes_the_same_places_later(name: str) -> None:
     assert slow.duration == pytest.approx(2.0 * fast.duration)
     for t in np.linspace(0.0, fast.duration, 9).tolist():
         assert curves_at(slow, 2 * t)[0] == pytest.approx(curves_at(fast, t)[0], abs=2e-3)
+
+
+@pytest.mark.parametrize("name", ["scale_time", "scale_shifts"])
+def test_the_trunk_moves_as_much_slower_over_the_feet_that_are_yet_to_stay(name: str) -> None:
+    line = getattr(Timeline(shift_time=0.4).body(z=-0.02, over=0.5), name)(3.0)
+    (shift, *_) = line.foot("FR", z=0.05, over=0.5).in_order(BalanceShift)
+    assert shift.end - shift.start == pytest.approx(1.2)
 
 
 def test_slower_beats_last_longer_and_half_the_amplitude_is_half_the_way() -> None:

@@ -63,6 +63,18 @@ def test_nothing_moves_where_nothing_must_and_a_bias_counts_as_if_made_with_it()
     assert not sway(stepping({})).any()
 
 
+def test_the_zero_moment_point_is_that_of_a_pendulum_that_rises_and_falls() -> None:
+    """x - x'' z / (g + z''), Vukobratovic, of a CoM that goes to and fro and up and down."""
+    asked, rate = stepping({}), 4.0 * np.pi / TIMES[-1]
+    way = 0.03 * np.cos(rate * TIMES)
+    height = 0.29 + 0.05 * np.cos(rate * TIMES)
+    asked.p_com[:, 2] = height
+    expected = way + rate**2 * way * height / (9.81 - rate**2 * (height - 0.29))
+    found = asked.zmp(np.column_stack([way, np.zeros(len(TIMES))]))
+    np.testing.assert_allclose(found[:, 0], expected, atol=1e-5)
+    np.testing.assert_array_equal(found[:, 1], 0.0)
+
+
 def test_com_and_zero_moment_point_stay_inside_of_three_feet_and_it_begins_and_ends_at_rest() -> (
     None
 ):
