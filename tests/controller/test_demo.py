@@ -46,6 +46,7 @@ def test_over_a_terrain_the_robot_walks_by_sight_and_its_recording_has_the_groun
         ground = go2.recording().ground
     assert report.ok, report.steps
     assert [item.name for item in report.steps] == ["stand", "walk", "cross", "stand_again"]
+    assert figure_of(report.steps[2], "way ahead").measured > step.end
     assert figure_of(report.steps[2], "up and down").measured == pytest.approx(0.12, abs=0.03)
     on_it = (np.abs(ground[:, 0] - 1.2) < 0.3) & (np.abs(ground[:, 1]) < 0.5)
     assert np.median(ground[on_it, 2]) == pytest.approx(0.12, abs=0.015)

@@ -37,6 +37,7 @@ from go2_wbc.robot.sensor_watch import (
     WatchedSensors,
     leg_motion,
     less_rolling,
+    watch_encoders,
     watch_force,
 )
 from go2_wbc.robot.speed_noise import noise_of_gyro
@@ -122,6 +123,15 @@ def test_a_sound_robots_readings_leave_as_they_came() -> None:
     assert faults == ()
     for field in fields(SensorReading):
         assert np.array_equal(getattr(last, field.name), getattr(readings[-1], field.name))
+
+
+def test_what_a_leg_moves_itself_by_is_its_speeds_derivative() -> None:
+    sensors = WatchedSensors()
+    for k in range(40):
+        t = DT * k
+        one = reading(k, q_joints=STANDING + 2.5 * t**2, v_joints=np.full(12, 5.0 * t))
+        plain(watch_encoders)(sensors, one, DT)
+    np.testing.assert_allclose(sensors.dv, 5.0, rtol=0.02)
 
 
 def test_legs_that_carry_a_robot_push_it_against_gravity() -> None:

@@ -13,6 +13,7 @@ from motions import Timeline, compile_timeline, deg
 from motions.dynamics import DynamicTrajectory, Tolerance, audit
 from motions.dynamics.solver import PlanTarget, _knots_of_written, _lag_of, nearest
 from motions.plan.trajectory import trajectory_of
+from tests.engine_helpers import standing_q
 
 WIDE = Tolerance(0.1, math.radians(15.0))
 SWAY = Timeline().body(y=0.06, over=0.14).hold(0.1).body(y=-0.06, over=0.14).home(over=0.3)
@@ -23,6 +24,12 @@ def written(line: Timeline, model: RobotModel) -> PlanTarget:
     path = trajectory_of(plan, model)
     stance = np.array([plan.at(float(t)).stance for t in path.times])
     return PlanTarget(path.times, path.q, stance)
+
+
+def test_between_two_instants_a_motion_goes_straight() -> None:
+    q = np.array([standing_q(0.3), standing_q(0.2)])
+    line = PlanTarget(np.array([0.0, 1.0]), q, np.ones((2, 4), dtype=bool))
+    np.testing.assert_allclose(line.at(np.array([0.25, 2.0])), [standing_q(0.275), q[1]])
 
 
 def two_feet(model: RobotModel) -> PlanTarget:
