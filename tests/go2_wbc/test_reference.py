@@ -11,7 +11,9 @@ from go2_wbc.errors import CommandError
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.reference import (
     ASTRAY,
+    BRISK,
     LEFT_BEHIND,
+    PROPPED,
     SLACK,
     STILL,
     Anchor,
@@ -159,6 +161,9 @@ def test_a_foot_is_held_by_what_its_motors_push_it_with_towards_its_place() -> N
             stays &= left > min(LEFT_BEHIND, float(np.linalg.norm(v_des))) - SLACK
             is_held = task is not LegTask.STANCE and stays and np.linalg.norm(way) > ASTRAY
             expected = force @ way / np.linalg.norm(way) if is_held else 0.0
+            goes_down = task is LegTask.SWING and way[2] < 0.0 and np.linalg.norm(v_des) < BRISK
+            if goes_down and expected < PROPPED:
+                expected = 0.0
             assert held[leg] == pytest.approx(expected, rel=1e-6)
             seen += is_held
         assert_plain_is_compiled(hold_feet, target, snapshot, tau, held)
@@ -166,23 +171,33 @@ def test_a_foot_is_held_by_what_its_motors_push_it_with_towards_its_place() -> N
 
 
 @pytest.mark.parametrize(
-    ("led", "moves", "is_held"),
-    [(0.6, 0.1, True), (0.0, 0.0, True), (0.4, 0.28, False), (0.0, 0.2, False), (-0.6, 0.0, False)],
+    ("led", "moves", "force", "is_held"),
+    [
+        (0.6, 0.1, 40.0, True),
+        (0.0, 0.0, 40.0, True),
+        (0.4, 0.28, 40.0, False),
+        (0.0, 0.2, 40.0, False),
+        (-0.6, 0.0, 40.0, False),
+        (0.6, 0.1, 20.0, False),
+        (1.4, 0.1, 20.0, True),
+        (-0.6, -0.1, -20.0, True),
+    ],
 )
-def test_a_foot_is_held_if_its_place_leaves_it_not_if_it_comes_late(
-    led: float, moves: float, is_held: bool
+def test_a_foot_is_held_if_its_place_leaves_it_not_if_it_comes_late_or_is_let_down(
+    led: float, moves: float, force: float, is_held: bool
 ) -> None:
-    # A foot that joints which rub let down late, and a leg whose knee lay on a slope, were "held".
+    # A foot that joints which rub let down late, a leg whose knee lay on a slope, and feet whose
+    # calves lay on the nose of a step, were "held".
     snapshot = MODEL.snapshot(random_state(np.random.default_rng(5)))
     velocities = np.zeros((4, 3))
     velocities[1, 2] = -moves
     snapshot = snapshot.replaced(v_world_feet=velocities)
     reference = random_reference(snapshot, (ST, SW, ST, ST), 2.0, np.random.default_rng(6))
     places, speeds = snapshot.p_world_feet.copy(), np.zeros((4, 3))
-    places[1, 2] -= 2.0 * ASTRAY
+    places[1, 2] -= np.sign(force) * 2.0 * ASTRAY
     speeds[1, 2] = -led
     target = Target.of(replace(reference, p_world_feet=places, v_world_feet=speeds).row)
-    held, load = np.empty(4), np.array([0.0, 0.0, -30.0])
+    held, load = np.empty(4), np.array([0.0, 0.0, -force])
     tau = snapshot.bias[6:] + np.tile(snapshot.J_feet[1][:, 9:12].T @ load, 4)
     hold_feet(target, snapshot, tau, held)
-    assert held[1] == pytest.approx(30.0 if is_held else 0.0, abs=1e-6)
+    assert held[1] == pytest.approx(abs(force) if is_held else 0.0, abs=1e-6)
