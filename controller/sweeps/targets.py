@@ -192,9 +192,9 @@ def motion_target(motion: object, name: str = "", world: World | None = None) ->
     from go2_wbc.robot.model import RobotModel
     from go2_wbc.world import DOUBTFUL
     from motions import CompiledPlan
-    from motions.feasibility import compile_motion
+    from motions.feasibility import FeasibilityChecker
 
-    plan = compile_motion(motion, RobotModel())
+    plan = FeasibilityChecker(RobotModel()).plan(motion, check=False)
     if not isinstance(plan, CompiledPlan):
         raise CommandError(f"only a compiled plan can be swept, got {type(plan).__name__}")
     if plan.entry not in (Posture.STAND, Posture.SIT):

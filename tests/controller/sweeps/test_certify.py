@@ -18,8 +18,9 @@ from controller.sweeps.certify import (
     read_certificate,
     with_certificate,
 )
-from controller.sweeps.motion_study import world_of
+from controller.sweeps.motion_study import archive_of, world_of
 from controller.sweeps.sweep_file import Row
+from controller.sweeps.targets import motion_target
 from go2_wbc import World
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.world import DOUBTFUL
@@ -83,6 +84,15 @@ def test_finished_runs_are_not_repeated_and_one_worker_gives_the_same(
     assert again == bows
     alone = certify(BOW, 2, workers=1, out=tmp_path / "one.sqlite")
     assert set(map(str, alone.worst)) <= set(map(str, bows.worst))
+
+
+def test_a_motion_that_asks_for_the_nearest_is_certified_as_that() -> None:
+    swayed = Timeline(name="sway", physics="nearest").hold(0.2).body(y=0.06, over=0.2)
+    line = swayed.body(y=-0.06, over=0.2).home(over=0.3).hold(0.3)
+    target = motion_target(line)
+    nearest = FeasibilityChecker().plan(line)
+    assert nearest.dynamic
+    assert target.about["plan"] == archive_of(nearest)
 
 
 def test_runs_are_in_samples_of_the_world_that_is_stated(tmp_path: Path) -> None:
