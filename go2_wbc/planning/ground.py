@@ -91,6 +91,11 @@ STUMBLE = 0.06  #: Roughness [m] that a foot tells which is stopped in the middl
 DELAY = 0.4
 """Share of a swing, on the roughest ground, in which the foot only rises: feet close to a step
 rubbed along its face. It and the six before are from a search in simulation."""
+EARLIER, CLIMBED, FORGETS = 0.15, 0.17, 0.1
+"""Share of a swing that is left, on stairs, when the foot has arrived above its place: one that
+still went ahead slid down along the face of the next step. Feet are there if they have come higher
+than one step [m]; the lowest place counts as this much [m] higher with each m that the robot goes.
+"""
 SLIP_SPEED, SLIP_PATIENCE = 0.1, 0.004
 """Speed [m/s] of the contact point, along the ground, above which a foot slides, and the time [s]
 for which it must. These numbers are from a search on this robot in simulation."""
@@ -159,6 +164,7 @@ class Ground(Record):
     p_seen: Float[np.ndarray, "2"]  #: where the CoM is [m]
     p_met: Float[np.ndarray, "4 3"]  #: where each foot met it last, by its centre [m]
     roughness: float  #: distance [m] from the plane at which feet were met lately
+    low: float  #: height [m] of the lowest place where a foot was met on it, as far as remembered
     rough_way: float  #: for how far [m] it is taken for rough yet
     high_way: float  #: for how far [m] steps are taken for high yet
     steeper: float  #: share of the slope by which the trunk follows it more
@@ -191,6 +197,12 @@ def is_rough(g: Ground) -> bool:
 
 
 @subroutine
+def highest(g: Ground) -> float:
+    """Height [m] of the highest of the places where the feet were met last, by its centre."""
+    return max(g.p_met[0, 2], g.p_met[1, 2], g.p_met[2, 2], g.p_met[3, 2])
+
+
+@subroutine
 def landing_height(g: Ground, z: float) -> float:
     """Height [m] at which a foot shall land whose place on the plane is as high as ``z``.
 
@@ -201,7 +213,7 @@ def landing_height(g: Ground, z: float) -> float:
     """
     if not is_rough(g):
         return z
-    return min(z, max(g.p_met[0, 2], g.p_met[1, 2], g.p_met[2, 2], g.p_met[3, 2]))
+    return min(z, highest(g))
 
 
 @subroutine
@@ -263,6 +275,15 @@ def delay(g: Ground) -> float:
 
 
 @subroutine
+def earliness(g: Ground, ahead: tuple[float, float]) -> float:
+    """Share of a swing that is left as the foot is above its place; up stairs, ``ahead`` [m/s]."""
+    speed = max(np.hypot(ahead[0], ahead[1]), LEAN_SPEED)
+    rise = (g.slope[0] * ahead[0] + g.slope[1] * ahead[1]) / speed
+    is_stairs = is_rough(g) and highest(g) - g.low > CLIMBED
+    return EARLIER * min(max(rise / STEEP - 1.0, 0.0), 1.0) if is_stairs else 0.0
+
+
+@subroutine
 def tilt(g: Ground) -> tuple[float, float]:
     """Slope that the trunk follows."""
     follow = FOLLOW + g.steeper
@@ -319,6 +340,8 @@ def carry_ground(g: Ground, c: RoughConfig, now: Snapshot, dt: float) -> None:
     g.ramp_way = FIRST_WAY if is_ramp else max(g.ramp_way - speed * dt, 0.0)
     g.high_way = max(g.high_way - come, way)
     g.rough_way = max(g.rough_way - come, c.way if is_met else 0.0)
+    least = min(g.p_met[0, 2], g.p_met[1, 2], g.p_met[2, 2], g.p_met[3, 2])
+    g.low = min(g.low + FORGETS * speed * dt, least) if is_rough(g) else least
     x, y = now.p_world_com[0], now.p_world_com[1]
     g.height = ground_at(g, x, y)
     g.p_seen[0], g.p_seen[1] = x, y

@@ -203,7 +203,8 @@ def note_liftoffs(
     for leg in range(4):
         foot = s.feet[leg].contact
         if foot.was_stance and not stance[leg]:
-            begin_swing(s.feet[leg].swing, now.p_world_feet[leg], s.ground, c.config.rough)
+            place, ahead = now.p_world_feet[leg], world_velocity(s.trunk)
+            begin_swing(s.feet[leg].swing, place, s.ground, c.config.rough, ahead)
             s.feet[leg].step.is_sighted = False
         if not stance[leg]:
             foot.is_awaited = False
@@ -212,8 +213,7 @@ def note_liftoffs(
         elif not foot.was_stance:
             foot.is_awaited = True
         if foot.is_awaited and contact[leg]:
-            met[leg] = True
-            foot.is_awaited = False
+            met[leg], foot.is_awaited = True, False
         foot.was_stance = stance[leg]
     if s.sight.sees:
         for leg in range(4):

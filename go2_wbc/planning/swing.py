@@ -2,10 +2,11 @@
 
 With the share ``u`` of a span of ``T`` seconds and the ease ``s(u) = 3 u^2 - 2 u^3``, a coordinate
 goes from ``a`` to ``b`` as ``p = a + s (b - a)``; so ``v = s' (b - a) / T`` and
-``a = s'' (b - a) / T^2``. Horizontally the span is the swing, or what is left of it after a delay,
-vertically each half of it; on rough ground its two parts are as the square roots of the ways up and
-down, so that the foot speeds up no more on one than on the other: halves made feet that rose to the
-next step push the robot down with its weight, and throw it when they slowed down.
+``a = s'' (b - a) / T^2``. Horizontally the span is the swing, or what is left of it after a delay
+and, up stairs, before its end; vertically each half of it; on rough ground its two parts are as the
+square roots of the ways up and down, so that the foot speeds up no more on one than on the other:
+halves made feet that rose to the next step push the robot down with its weight, and throw it when
+they slowed down.
 
 How high a foot is raised, and how late it goes ahead, is settled when it leaves the ground. What is
 learnt of the ground meanwhile is for the next swing: a curve that was changed on the way jumped by
@@ -43,6 +44,7 @@ from go2_wbc.planning.ground import (
     RoughConfig,
     apex_raise,
     delay,
+    earliness,
     is_met_rough,
     is_rough,
 )
@@ -130,6 +132,7 @@ class Swing(Record):
     start: Array3  #: where the foot was [m]
     raised: float  #: height [m] by which its apex is higher than on smooth ground
     delay: float  #: share of it in which the foot only rises
+    early: float  #: share of it that is left when the foot has arrived above its goal
     begun: float  #: share of the gait's swing that had passed by then
     beyond: float  #: how far [m] ahead of its start it ends at least; 0 for wherever it is led
     is_awaited: bool  #: whether the gait waits while it rises, stopped in a fast way
@@ -151,11 +154,13 @@ class Step(Record):
 
 
 @subroutine
-def begin_swing(swing: Swing, p_foot: Array3, ground: Ground, c: RoughConfig) -> None:
-    """A foot leaves the ground."""
+def begin_swing(
+    swing: Swing, p_foot: Array3, ground: Ground, c: RoughConfig, ahead: tuple[float, float]
+) -> None:
+    """A foot leaves the ground, of a robot on its way ``ahead`` [m/s]."""
     swing.start[:] = p_foot
     swing.raised, swing.delay, swing.begun = apex_raise(ground, c), delay(ground), 0.0
-    swing.beyond, swing.is_awaited = 0.0, False
+    swing.beyond, swing.is_awaited, swing.early = 0.0, False, earliness(ground, ahead)
     swing.peak = 0.0 if is_rough(ground) else 0.5
 
 
@@ -172,7 +177,7 @@ def resume_swing(
         is_step = is_rough(ground) or is_met_rough(ground, now)
         swing.start[:] = now.p_world_feet[leg]
         swing.raised, swing.beyond = (ABOVE, BEYOND) if is_step else (0.0, 0.0)
-        swing.delay, swing.begun = delay(ground), progress
+        swing.delay, swing.begun, swing.early = delay(ground), progress, 0.0
         swing.peak, swing.is_awaited = 0.5, is_step and is_fast
 
 
@@ -239,11 +244,13 @@ def swing_foot(
     share = 1.0 - swing.begun
     progress = own_progress(swing, progress)
     duration = share * (1.0 - clock.duty) * clock.period / pace(clock)
-    start, late = swing.start, swing.delay
-    span = duration * (1.0 - late)
+    start, late, end = swing.start, swing.delay, 1.0 - swing.early
+    span = duration * (end - late)
     x, dx, ddx = 0.0, 0.0, 0.0
-    if progress >= late - TIE:
-        x, dx, ddx = cubic((progress - late) / (1.0 - late))
+    if progress > end:
+        x = 1.0
+    elif progress >= late - TIE:
+        x, dx, ddx = cubic((progress - late) / (end - late))
     for i in range(2):
         delta = goal[i] - start[i]
         p[i] = start[i] + x * delta

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from go2_wbc.planning.ground import (
+    CLIMBED,
     DELAY,
+    EARLIER,
     FAST,
     FAST_HASTE,
     FIRST_WAY,
+    FORGETS,
     FRICTION_RISE,
     GROUND_SHARE,
     HALF_SPEED,
@@ -40,6 +43,7 @@ from go2_wbc.planning.ground import (
     apex_raise,
     carry_ground,
     delay,
+    earliness,
     exerted_ratio,
     expect_steps,
     ground_at,
@@ -233,6 +237,23 @@ def test_a_step_raises_the_swing_for_a_while_and_smooth_ground_does_not() -> Non
         ground.slope[:] = steep, 0.0
         assert apex_raise(ground, CONFIG) == pytest.approx(raised)
     assert delay(ground) == 0.0
+
+
+def test_feet_arrive_earlier_on_stairs_that_rise_but_not_on_a_block() -> None:
+    snapshot, up = on_plane(np.zeros(2)), (0.5, 0.0)
+    ground, walking = plane(snapshot), snapshot.replaced(v_world_com=np.array([0.5, 0.0, 0.0]))
+    carry_ground(ground, CONFIG, walking, 0.0)
+    ground.slope[0], ground.roughness = 2.0 * STEEP, 2.0 * ROUGH
+    for climbed, expected in ((0.9 * CLIMBED, 0.0), (1.1 * CLIMBED, EARLIER)):
+        ground.p_met[:, 2] = snapshot.p_world_feet[:, 2] + climbed  # with all feet on a block
+        carry_ground(ground, CONFIG, walking, 0.0)
+        assert earliness(ground, up) == pytest.approx(expected)
+    assert earliness(ground, (-0.5, 0.0)) == 0.0
+    carry_ground(ground, CONFIG, walking, 0.11 * CLIMBED / FORGETS / 0.5)
+    assert earliness(ground, up) == 0.0, "the lowest place is far behind"
+    ground.low -= CLIMBED
+    ground.rough_way = 0.0
+    assert earliness(ground, up) == 0.0
 
 
 def test_the_trunk_is_carried_for_the_next_step_up_until_the_ground_falls_or_a_way_is_come() -> (

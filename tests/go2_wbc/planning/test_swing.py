@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from go2_wbc.contacts import GAITS, ContactPhase
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.gait_clock import WAITING, Clock
+from go2_wbc.planning.ground import EARLIER
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.planning.swing import (
     ABOVE,
@@ -22,6 +23,7 @@ from go2_wbc.planning.swing import (
     loaded_time,
     swing_foot,
 )
+from go2_wbc.reference import SWING as SWINGS
 from go2_wbc.reference import Reference
 from tests import engine_helpers as helpers
 
@@ -205,6 +207,30 @@ def test_a_foot_that_was_stopped_rises_well_above_and_comes_down_well_beyond_tha
     most = left * (LocomotionConfig().swing.apex + ABOVE)
     assert feet[:, 2].max() - place[2] == pytest.approx(most, abs=0.01)
     assert feet[-1, 0] - place[0] == pytest.approx(BEYOND, abs=0.01)
+
+
+@pytest.mark.parametrize(("climbed", "comes_from_above"), [(0.26, True), (0.14, False)])
+def test_up_stairs_a_foot_is_above_its_place_before_it_comes_down(
+    climbed: float, *, comes_from_above: bool
+) -> None:
+    # Feet that still went ahead met the face of the next step and slid down along it. After a
+    # single step, as of a block, they do.
+    model, trot = helpers.symmetric_model(), GAITS["trot"]
+    start = model.snapshot(helpers.state_of(helpers.standing_q()))
+    planner, found = LocomotionPlanner(model, trot, LocomotionConfig()), []
+    planner.start(start)
+    ground = planner._state.ground
+    ground.slope[0], ground.rough_way, ground.low = 0.43, 1.0, start.p_world_feet[0, 2] - climbed
+    planner._state.trunk.velocity[0] = 0.5
+    for n in range(round(2.0 * trot.period / TICK)):
+        now = start.replaced(state=replace(start.state, time=n * TICK))
+        asked = planner.update(now, VelocityCommand(0.5))
+        if asked.legs[0] != SWINGS:
+            break
+        found.append(asked.v_world_feet[0])
+    last = np.array(found)[-round((EARLIER - 0.02) * len(found)) : -1]
+    assert (last[:, 2] < -0.1).all()
+    assert (last[:, 0] == 0.0).all() == comes_from_above
 
 
 HIGH = 0.05  # m of a foot above the ground when it may have come onto a step
