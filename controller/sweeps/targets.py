@@ -16,13 +16,14 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from types import FunctionType, ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from controller.sweeps.sweep_file import Row, row_of
 from go2_wbc.errors import CommandError, Go2WbcError, SweepError, unknown_name
 
 if TYPE_CHECKING:
     from go2_wbc.world import World
+    from motions import Playable
 
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -194,7 +195,7 @@ def motion_target(motion: object, name: str = "", world: World | None = None) ->
     from motions import CompiledPlan
     from motions.feasibility import FeasibilityChecker
 
-    plan = FeasibilityChecker(RobotModel()).plan(motion, check=False)
+    plan = FeasibilityChecker(RobotModel()).plan(cast("Playable", motion), check=False)
     if not isinstance(plan, CompiledPlan):
         raise CommandError(f"only a compiled plan can be swept, got {type(plan).__name__}")
     if plan.entry not in (Posture.STAND, Posture.SIT):

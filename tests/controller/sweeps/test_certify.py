@@ -24,7 +24,7 @@ from controller.sweeps.targets import motion_target
 from go2_wbc import World
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.world import DOUBTFUL
-from motions import FeasibilityChecker, Timeline, deg
+from motions import CompiledPlan, FeasibilityChecker, Timeline, deg
 from tests.controller.cli.conftest import Run, Said
 from tests.controller.sweeps import swept
 from tests.script_server import pytest_with
@@ -91,6 +91,7 @@ def test_a_motion_that_asks_for_the_nearest_is_certified_as_that() -> None:
     line = swayed.body(y=-0.06, over=0.2).home(over=0.3).hold(0.3)
     target = motion_target(line)
     nearest = FeasibilityChecker().plan(line)
+    assert isinstance(nearest, CompiledPlan)
     assert nearest.dynamic
     assert target.about["plan"] == archive_of(nearest)
 
