@@ -16,14 +16,13 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from types import FunctionType, ModuleType
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 from controller.sweeps.sweep_file import Row, row_of
 from go2_wbc.errors import CommandError, Go2WbcError, SweepError, unknown_name
 
 if TYPE_CHECKING:
     from go2_wbc.world import World
-    from motions import Playable
 
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -193,9 +192,9 @@ def motion_target(motion: object, name: str = "", world: World | None = None) ->
     from go2_wbc.robot.model import RobotModel
     from go2_wbc.world import DOUBTFUL
     from motions import CompiledPlan
-    from motions.feasibility import FeasibilityChecker
+    from motions.feasibility import compile_motion
 
-    plan = FeasibilityChecker(RobotModel()).plan(cast("Playable", motion), check=False)
+    plan = compile_motion(motion, RobotModel())
     if not isinstance(plan, CompiledPlan):
         raise CommandError(f"only a compiled plan can be swept, got {type(plan).__name__}")
     if plan.entry not in (Posture.STAND, Posture.SIT):

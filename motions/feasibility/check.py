@@ -107,7 +107,7 @@ def compile_motion(
         motion: a ``Playable``; anything else is refused.
         model: must not be that of a control loop that runs in another thread.
         mend, progress, memory: as for ``compile_timeline``; ``mend`` is asked for timelines with
-            ``physics="nearest"`` only.
+            ``physics="nearest"`` only, by default a checker of that robot in the usual world.
 
     Raises:
         CommandError: for an unknown name, or for what stands for no motion.
@@ -126,7 +126,7 @@ def compile_motion(
             "motion must be a name of the library, a function with @motion before it, a Timeline, "
             f"a plan or a CheckedMotion, got {motion!r}"
         )
-    asked = mend if line.physics == NEAREST else None
+    asked = (mend or FeasibilityChecker(model)._broken) if line.physics == NEAREST else None
     return compile_timeline(line, model, mend=asked, progress=progress, memory=memory)
 
 
