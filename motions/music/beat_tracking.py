@@ -7,7 +7,8 @@ milliseconds and not a frame of the analysis.
 
 A bar begins where the bass is strong and the harmony changes (Goto and Muraoka, "Real-time Beat
 Tracking for Drumless Audio Signals", 1999). So of all metres and first beats the one is taken for
-which both are highest above the other beats, in standard errors.
+which both are highest above the other beats, in standard errors. Where there is no bass, as of
+clicks, strokes that are louder or higher begin the bars.
 """
 
 from __future__ import annotations
@@ -264,6 +265,7 @@ one where nothing tells."""
 BAR_WINDOW, BAR_HOP = 2048, 512
 """Samples of a frame (93 ms), long enough to tell tones apart, and from one to the next."""
 BASS = slice(1, 15)  #: Rows of the spectrum up to 150 Hz
+LEAST_BASS = 0.01  #: Share of a song's power, below which its bass tells no bars: own choice
 STROKE = 6  #: Frames (0.14 s) after a beat in which its bass is looked for
 
 PerBeat = Float[np.ndarray, " k"]
@@ -285,8 +287,18 @@ def bars(sound: Sound, times: PerBeat, metre: int | None = None) -> tuple[int, i
     loudness = power[BASS].sum(axis=0)
     near = [loudness[max(k - 2, 0) : k + STROKE].max() + 1e-6 for k in frames.tolist()]
     heard = _standard(np.log(near)) + _standard(_changes(chroma, frames))
+    if loudness.sum() < LEAST_BASS * power.sum():
+        heard = _accents(power, frames)
     places = [(m, first) for m in ([metre] if metre else HEARD) for first in range(m)]
     return max(places, key=lambda place: _evidence(heard, *place))
+
+
+def _accents(power: Float[np.ndarray, "b n"], frames: Int[np.ndarray, " k"]) -> PerBeat:
+    """How much louder, or higher, the stroke of each beat is than others: of clicks and claps."""
+    strokes = np.stack([power[:, k : k + STROKE].sum(axis=1) for k in frames.tolist()], axis=1)
+    whole = strokes.sum(axis=0) + 1e-9
+    height = np.arange(len(power)) @ strokes / whole + 1e-9
+    return np.log(whole) + np.log(height)
 
 
 def _changes(chroma: Float[np.ndarray, "12 n"], frames: Int[np.ndarray, " k"]) -> PerBeat:

@@ -71,6 +71,17 @@ def test_a_waltz_is_a_waltz(metre: int, seed: int, tmp_path: Path) -> None:
     assert beats(sound(cut, tmp_path)).downbeat == metre - 1
 
 
+@pytest.mark.parametrize("missing", [1, 2, 3])
+def test_the_bars_of_a_click_track_begin_on_its_accents_behind_a_pick_up(
+    missing: int, tmp_path: Path
+) -> None:
+    """It has no bass, by which the bars of music are told."""
+    song = click_track(100.0, SECONDS)
+    cut = song.samples[round((song.beats[missing] - 0.2) * RATE) :]
+    found = beats(sound(cut, tmp_path))
+    assert (found.metre, found.downbeat) == (4, 4 - missing)
+
+
 def test_a_file_of_two_channels_at_another_rate_is_read(tmp_path: Path) -> None:
     song, rate = click_track(90.0, SECONDS), 48000
     times = np.arange(round(SECONDS * rate)) / rate
