@@ -101,6 +101,7 @@ class CertifiedRate:
     worst: tuple[CertifiedRun, ...]  #: the worst runs, the worst first
     versions: Mapping[str, str]  #: what else it holds for, by name
     outdated: str = ""  #: why it does not hold for what is shown; empty if it does
+    why: str = ""  #: why runs failed: the commonest reason; empty if none did
 
 
 @typed()

@@ -10,6 +10,8 @@ than the stated confidence; for the exact confidence, do all runs.
 from __future__ import annotations
 
 import math
+import re
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
 RUNS = 200
 WORST = 5  #: How many of the worst runs are named
 FEWEST = 20  #: Runs before which nothing ends early
+_NUMBER = re.compile(r"\d+(?:\.\d+)?")
 _HOLDS_FOR = ("version", "code", "plan", "libraries", "python")
 """What a page names of a certificate's ``about``, besides its world."""
 
@@ -46,6 +49,7 @@ class Certificate:
         worst: the worst runs, the worst first: their rows in ``path``.
         about: what the certificate holds for: versions, and digests of code and plan.
         path: the file with all rows; each can be replayed.
+        why: why runs failed, in words: the commonest reason; empty if none did.
     """
 
     motion: str
@@ -55,6 +59,7 @@ class Certificate:
     worst: tuple[Row, ...]
     about: Mapping[str, str]
     path: Path
+    why: str = ""
 
     __repr__ = brief
 
@@ -75,6 +80,7 @@ class Certificate:
         lines = [
             f"{self.motion:.50}: done in {self.done} of {self.n} runs, {100.0 * self.rate:.1f} %",
             f"95 % interval of the rate: {low:.1f} to {high:.1f} %",
+            *([f"{self.why:.80}"] if self.why else []),
             "",
             f"{'seed':>6}  {'friction':>8} {'mass':>6}  worst runs",
             "-" * 80,
@@ -96,6 +102,7 @@ class Certificate:
             "rate": self.rate,
             "interval": list(self.interval),
             "confidence": CONFIDENCE,
+            "why": self.why,
             "worst": [{name: finite(value) for name, value in row.items()} for row in self.worst],
             "about": dict(self.about),
             "file": str(self.path),
@@ -177,7 +184,21 @@ def _certificate(result: SweepResult) -> Certificate:
         worst=tuple(sorted(rows, key=_goodness)[:WORST]),
         about=result.about,
         path=result.path,
+        why=_why(rows),
     )
+
+
+def _why(rows: Sequence[Row]) -> str:
+    """The commonest reason of runs that failed, in how many of them, and where it was worst."""
+    failed = [str(row["harm"]).split("; ") for row in rows if not row["done"]]
+    kinds = Counter(_NUMBER.sub("", one) for harms in failed for one in harms)
+    if not kinds:
+        return ""
+    (kind, count), *_ = kinds.most_common(1)
+    same = [one for harms in failed for one in harms if _NUMBER.sub("", one) == kind]
+    worst = max(same, key=lambda one: [float(number) for number in _NUMBER.findall(one)])
+    share = "" if count == len(failed) else f", {count} of them"
+    return f"{len(failed)} of {len(rows)} runs failed{share}: {worst}"
 
 
 def _narrow(width: float) -> Callable[[Sequence[Row]], bool]:
@@ -237,6 +258,7 @@ def certified_rate(certificate: Certificate, plan: MotionPlan) -> CertifiedRate:
         worst=tuple(map(run, certificate.worst)),
         versions={name: about[name] for name in _HOLDS_FOR if name in about},
         outdated=_outdated(about, plan),
+        why=certificate.why,
     )
 
 

@@ -14,6 +14,7 @@ from controller.report_view import planned
 from controller.sweeps.certify import (
     FEWEST,
     _narrow,
+    _why,
     certified_rate,
     read_certificate,
     with_certificate,
@@ -201,3 +202,16 @@ def test_the_marker_requires_a_rate_and_says_what_is_missing(tmp_path: Path) -> 
     assert "got 90" in done.stdout
     assert "certify_motion needs the marker" in done.stdout
     assert "Traceback" not in done.stdout
+
+
+def test_the_commonest_reason_of_failures_is_told_once_where_it_was_worst() -> None:
+    rows = [
+        {"done": False, "harm": "trunk 9.5 deg off; slip 30 mm"},
+        {"done": True, "harm": ""},
+        {"done": False, "harm": "fell; trunk 39.0 deg off"},
+        {"done": False, "harm": "fell"},
+        {"done": False, "harm": "trunk 12.1 deg off"},
+    ]
+    assert _why(rows) == "4 of 5 runs failed, 3 of them: trunk 39.0 deg off"
+    assert _why(rows[3:4]) == "1 of 1 runs failed: fell"
+    assert _why(rows[1:2]) == ""

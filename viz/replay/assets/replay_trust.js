@@ -9,7 +9,7 @@ function showTrust({ chance, world, certified }) {
   if (chance !== null) {
     const line = plainText("p", "Chance that it is done so: ");
     const stated = chance > 0.99 ? "over 99 %" : chance < 0.01 ? "under 1 %" : percent(chance, 0);
-    line.append(plainText("b", stated, chanceRank(chance)));
+    line.append(plainText("b", stated, chanceRank(Math.min(chance, certified && !certified.outdated ? certified.interval[1] : 1))));
     const where = plainText("p", world, "calm");
     where.title = world;
     place.replaceChildren(line, where);
@@ -20,7 +20,7 @@ function showTrust({ chance, world, certified }) {
 }
 
 function describeCertificate(details, certified) {
-  const { n, done, interval: [low, high], confidence, outdated } = certified;
+  const { n, done, interval: [low, high], confidence, outdated, why } = certified;
   const summary = details.querySelector("summary");
   const bounds = `${percent(confidence, 0)} interval: ${percent(low)} to ${percent(high)}`;
   summary.replaceChildren(
@@ -28,6 +28,7 @@ function describeCertificate(details, certified) {
     plainText("span", `${percent(done / n)}, ${bounds}`, "calm"),
     rateBar([[low, high, "interval"], [done / n, done / n, "rate"]]));
   details.classList.toggle("outdated", outdated !== "");
+  if (why) summary.append(plainText("span", why, "warning"));
   if (outdated) summary.append(plainText("span", outdated, "warning"));
   const box = details.querySelector("div");
   box.replaceChildren(plainText("h3", "Worst runs"), worstTable(certified.worst), plainText("h3", "Holds for"));
