@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 import time
 import webbrowser
@@ -49,7 +50,7 @@ def run(
             if json:
                 print_json_line({"url": studio.url, "file": str(path)})
             else:
-                print(f"{studio.motion}: {studio.url}   (edits {shown_path(path)}; Ctrl-C ends)")
+                print(f"{studio.motion}: {studio.url}   (all is done on this page; Ctrl-C ends)")
             if not live.no_open and display_problem() is None:
                 webbrowser.open(studio.url)
             studio.warm()
@@ -70,8 +71,9 @@ def _file_of(word: str) -> tuple[Path, str | None]:
     path = Path(own)
     if own.endswith(".py"):
         if not path.exists():
-            with redirect_stdout(sys.stderr):
+            with redirect_stdout(io.StringIO()):  # what comes next is on the page
                 new(path.stem, out=path.parent)
+            print(f"began {shown_path(path)}", file=sys.stderr)
         return path, name or None
     (motion,) = motions_of(word)
     source = Path(motion.source.rpartition(":")[0])

@@ -1,5 +1,6 @@
 """The command line finds its commands, and every way to fail has its message and exit code."""
 
+import importlib
 import logging
 import os
 import shlex
@@ -307,3 +308,13 @@ def test_a_reader_that_has_gone_is_no_noise() -> None:
         os.close(writing)
     assert done.returncode == ExitCode.BROKEN_PIPE
     assert done.stderr == ""
+
+
+def test_it_runs_as_a_module_where_its_script_is_not_on_the_path(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["controller.cli", "no-such-command"])
+    with pytest.raises(SystemExit) as ended:
+        importlib.import_module("controller.cli.__main__")  # which python -m runs
+    assert ended.value.code == USAGE
+    assert "no-such-command" in capsys.readouterr().err

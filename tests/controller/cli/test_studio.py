@@ -1,21 +1,26 @@
 """``go2-wbc studio``: which file it edits, and what it never writes over."""
 
+import time
+import urllib.request
 from pathlib import Path
 
 import pytest
 
 from controller.cli.common import ExitCode
+from controller.cli.motion_preview import POLL_PERIOD
 from controller.cli.studio import _file_of
 from motions import load_file
 from tests.controller.cli.conftest import Run
 from tests.live_preview import LivePreview
+from tests.viz.page_reader import read_message, read_pack
 
 
 def test_a_file_is_begun_and_an_old_one_is_not_touched(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     path, name = _file_of("greet.py")
+    assert capsys.readouterr() == ("", "began greet.py\n"), "all else is on the page"
     assert (path, name) == (Path("greet.py"), None)
     assert list(load_file(path)) == ["greet"]
     path.write_text("mine", encoding="utf-8")
@@ -42,9 +47,22 @@ def test_a_file_that_is_no_motion_is_told(tmp_path: Path, run: Run) -> None:
     assert "greet.py, line 1: SyntaxError" in told
 
 
+def _wait_for(title: str, url: str) -> None:
+    """Until a page that is opened there shows a motion of this title."""
+    for _ in range(600):
+        with urllib.request.urlopen(url.replace("/?", "/data?")) as answer:
+            if read_pack(read_message(answer.read())[1])[0]["title"] == title:
+                return
+        time.sleep(POLL_PERIOD)
+    pytest.fail(f"{title} is not shown")
+
+
 @pytest.mark.slow
-def test_it_serves_until_ctrl_c(tmp_path: Path) -> None:
+def test_it_serves_what_is_saved_until_ctrl_c(tmp_path: Path) -> None:
     with LivePreview(command="studio", folder=tmp_path) as studio:
         assert "/?token=" in studio.url
-        assert (tmp_path / "my_motion.py").exists()
+        file = tmp_path / "my_motion.py"
+        _wait_for("my_motion", studio.url)
+        file.write_text(file.read_text("utf-8").replace("my_motion", "other"), encoding="utf-8")
+        _wait_for("other", studio.url)
         assert studio.interrupt() == ExitCode.OK
