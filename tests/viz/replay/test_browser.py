@@ -70,6 +70,20 @@ def test_space_plays_and_pauses_and_arrows_step_by_one_frame(browser: Tab) -> No
     assert browser.evaluate("replay.isPlaying") is False
 
 
+def test_all_that_moves_waits_for_the_picture(browser: Tab) -> None:
+    """Where the 3D view is drawn slowly, readouts and playheads else run ahead of it."""
+    browser.evaluate(
+        "Object.defineProperty(replay.scene, 'isDrawn', { configurable: true, get: () => false }),"
+        " replay.seek(0), replay.play(true)"
+    )
+    for _ in range(3):
+        browser.evaluate(DRAWN)
+    assert browser.evaluate("replay.time") == 0.0
+    browser.evaluate("void delete replay.scene.isDrawn")
+    browser.wait_for("replay.time > 0")
+    browser.evaluate("replay.play(false)")
+
+
 def test_the_readouts_follow_the_time(browser: Tab) -> None:
     browser.evaluate("replay.scrub(2.0)")
     assert browser.text("#behaviour") == "High five"

@@ -2,6 +2,7 @@
 // The player: one clock that moves the scene and the charts, buttons and keys.
 
 const END_PAUSE = 1.2; // s that the last picture stays before the replay starts over
+const LONGEST_FRAME = 0.5; // s that pass at once: more is a page that was not looked at
 const LONG_STEP = 1.0; // s, shift with an arrow key
 
 class Player {
@@ -44,6 +45,7 @@ class Player {
     const { classList } = document.getElementById("app");
     for (const name of Object.keys(GHOST_COLORS)) classList.toggle(`has-${name}`, data[name] !== null);
     document.getElementById("force-key").textContent = isPlan ? "planned force" : "measured force";
+    document.getElementById("ghost-force-key").textContent = isPlan ? "force of the blue one" : "planned force";
     const who = [`Solid: ${isPlan ? "the plan" : "what was measured"}.`];
     if (data.ghost) who.push(data.proposed ? "Blue: the nearest that the robot can do." : "Blue: the plan, which was checked.");
     document.querySelector("[data-ghost=ghost]").firstChild.textContent = data.proposed ? "Nearest" : "Plan";
@@ -81,8 +83,10 @@ class Player {
     requestAnimationFrame((now) => this.tick(now));
   }
 
+  // One clock for all that moves: where the 3D view takes longer than a frame, all wait for it.
   tick(now) {
-    const passed = Math.min((now - this.last) / 1000, 0.1);
+    if (!this.scene.isDrawn) return void requestAnimationFrame((later) => this.tick(later));
+    const passed = Math.min((now - this.last) / 1000, LONGEST_FRAME);
     this.last = now;
     if (this.isPlaying) this.advance(passed);
     if (this.scene.shown.orbit) this.scene.orbit(passed);

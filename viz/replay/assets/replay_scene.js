@@ -59,10 +59,23 @@ class RobotScene {
     viewer.animate = () => {};
     viewer.needs_render = false;
     viewer.set_dirty = () => {
-      if (!viewer.needs_render) requestAnimationFrame(() => viewer.needs_render && viewer.render());
+      if (!viewer.needs_render) requestAnimationFrame(() => viewer.needs_render && this.draw());
       viewer.needs_render = true;
     };
     viewer.set_dirty();
+  }
+
+  draw() {
+    const gl = this.viewer.renderer.getContext();
+    this.viewer.render();
+    this.fence = gl.fenceSync?.(gl.SYNC_GPU_COMMANDS_COMPLETE, 0); // none in WebGL 1
+    gl.flush();
+  }
+
+  // Whether the last picture is on its way to the screen, and no longer waits to be drawn.
+  get isDrawn() {
+    const gl = this.viewer.renderer.getContext();
+    return !this.fence || gl.getSyncParameter(this.fence, gl.SYNC_STATUS) !== gl.UNSIGNALED;
   }
 
   // meshcat puts all that Python names below a node of its own.
