@@ -92,6 +92,7 @@ def certified(
 def row_of(rate: CertifiedRate, motion: str, base: str) -> dict[str, object]:
     """A line of the page's table: of which text, motion and world, and what came of it."""
     known = {"n": rate.n, "done": rate.done, "interval": rate.interval, "world": rate.world}
+    known["why"] = rate.why
     return {**known, "motion": motion, "base": base}
 
 

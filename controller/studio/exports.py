@@ -95,7 +95,7 @@ def exported(
 
 def beside(file: Path, motion: str, kind: str) -> Path:
     """Where an export of a motion lies."""
-    ending = "plan" if kind in _BRIDGES else kind
+    ending = f"{kind}.plan" if kind in _BRIDGES else kind
     return file.with_name(f"test_{motion}.py" if kind == "test" else f"{motion}.{ending}")
 
 
@@ -104,7 +104,7 @@ def answer(path: Path, kind: str, *, is_new: bool = True) -> dict[str, object]:
     told = f"wrote {path.name}" if is_new else f"{path.name} is there already, and stays"
     told += _BRIDGES.get(kind, "")
     then = {"then": _THEN[kind].format(quote(path.name))} if kind in _THEN else {}
-    return {"told": told, "file": path.name, **then}
+    return {"told": told, "file": path.name, "folder": str(path.resolve().parent), **then}
 
 
 def write_test(path: Path, file: Path, motion: str) -> bool:

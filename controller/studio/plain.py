@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from dataclasses import replace
+from difflib import SequenceMatcher
+from math import degrees
 from typing import TYPE_CHECKING
 
 from controller.studio.orders import Order, Task
 
 if TYPE_CHECKING:
-    from viz.content import Annotation, ReplayContent
+    from viz.content import Annotation, MarginCurve, ReplayContent
 
 UNSOLVED = "dynamic plan"  #: The check that is broken where no jump was found
 ENDS = "entry and exit"  #: The check of how a motion starts and ends
@@ -19,13 +23,70 @@ WHEN = {"draft": "when you let go", "meanwhile": "meanwhile", "later": "again wi
 LOOKED_FOR = "a way to do this is looked for; until then the robot rests here"
 NOT_HOME = "it must end at rest on four feet, as it begins. All home at the end does that"
 
+HOME_FIRST = "All home before it does that"  #: What a page offers to put there, by these words
+AWAY = {
+    "body x": "the trunk is shifted",
+    "body y": "the trunk is shifted",
+    "body z": "the trunk is higher or lower",
+    "body roll": "the trunk leans",
+    "body pitch": "the trunk is tilted",
+    "body yaw": "the trunk is turned",
+    "balance": "the trunk is over three feet",
+}
+"""What a refusal of the language names that is not at home, in words."""
+FEET = {"FL": "front left", "FR": "front right", "RL": "rear left", "RR": "rear right"}
+_PLACE = re.compile(r"^(?:\w+ \()?[^\s()]+\.py(?:, line (\d+))?\)?: ")  # where it is refused
+_AWAY = re.compile(r"^(.*); away: (.*)$")
+_FOOT = re.compile(r"(?:\w+\(\): )?foot (FL|FR|RL|RR) is (.*)$")
+_STATES = {
+    "not raised": "not up there: raise it before",
+    "raised: put it down() before": "still up there: put it down before",
+}
+_MEASURE = re.compile(r"(-?[\d.]+(?:e-?\d+)?) (m|rad), limit (-?[\d.]+(?:e-?\d+)?)")
+_SHOWN = {"m": (100.0, " cm"), "rad": (degrees(1.0), "\N{DEGREE SIGN}")}
+
+
+def refusal(error: str, before: bytes, after: bytes) -> str:
+    """Why the language refuses a text, in words, with the line of the text that was there before.
+
+    ``after`` is what it would be: its lines are those that ``error`` counts.
+    """
+    match = _PLACE.match(error)
+    if match is None:
+        return error
+    words, line = error[match.end() :], _line_before(int(match[1] or 0), before, after)
+    if away := _AWAY.match(words):
+        found = ", ".join(dict.fromkeys(_still(away[2].split(", "))))
+        words = f"it starts standing at home, and there {found}. {HOME_FIRST}"
+    elif (foot := _FOOT.match(words)) and foot[2] in _STATES:
+        words = f"the {FEET[foot[1]]} foot is {_STATES[foot[2]]}"
+    return f"{words} (line {line})" if line else words
+
+
+def _still(away: list[str]) -> Iterator[str]:
+    for one in away:
+        if one.startswith("foot "):
+            yield f"the {FEET[one[-2:]]} foot is up"
+        elif one != "balance" or len(away) == 1:
+            yield AWAY.get(one, one)
+
+
+def _line_before(line: int, before: bytes, after: bytes) -> int:
+    """Which line of a text it was; 0 for one that was not there."""
+    was, now = before.splitlines(), after.splitlines()
+    for _, start, end, first, last in SequenceMatcher(None, was, now, False).get_opcodes():
+        if first < line <= last:
+            return min(start + line - first, end) if end > start else 0
+    return 0
+
 
 def plainly(content: ReplayContent) -> ReplayContent:
     """It with other words where those of the check are of its code or of the solver."""
     if content.verdict is None:
         return content
     found = tuple(replace(one, text=_words(one)) for one in content.verdict.annotations)
-    return replace(content, verdict=replace(content.verdict, annotations=found))
+    curves = tuple(_as_drawn(curve) for curve in content.verdict.curves)
+    return replace(content, verdict=replace(content.verdict, annotations=found, curves=curves))
 
 
 def coarsely(content: ReplayContent, order: Order) -> ReplayContent:
@@ -52,6 +113,21 @@ def is_unsolved(content: ReplayContent) -> bool:
 def _words(one: Annotation) -> str:
     if one.limit == UNSOLVED:
         return LOOKED_FOR if one.text == LOOKED_FOR else NO_WAY
-    if one.limit == ENDS and one.subject.startswith(LAST) and one.text.endswith("home()"):
+    if one.limit == ENDS and one.subject.startswith(LAST) and "home()" in one.text:
         return NOT_HOME
-    return one.text
+    return _MEASURE.sub(_as_read, one.text)
+
+
+def _as_drawn(curve: MarginCurve) -> MarginCurve:
+    scale, unit = _SHOWN.get(curve.unit, (1.0, curve.unit))
+    if scale == 1.0:
+        return curve
+    tight = scale * curve.tight
+    return replace(curve, unit=unit.strip(), margin=scale * curve.margin, tight=tight)
+
+
+def _as_read(match: re.Match[str]) -> str:
+    """A value and its limit in cm or degrees."""
+    scale, unit = _SHOWN[match[2]]
+    value, limit = (f"{scale * float(number):.3g}" for number in (match[1], match[3]))
+    return f"{value}{unit}, limit {limit}{unit}"

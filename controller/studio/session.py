@@ -17,7 +17,7 @@ from controller.studio.edits import cut_of, edited, run_of, site_of
 from controller.studio.grounds import PlayedGround, ground_of
 from controller.studio.library import library
 from controller.studio.orders import AT_ONCE, Answer, Bar, Cut, Doing, Order, Task
-from controller.studio.plain import NO_WAY
+from controller.studio.plain import NO_WAY, refusal
 from controller.studio.project import Project
 from controller.studio.proposals import proposal, read
 from controller.studio.rewriting import offers
@@ -186,7 +186,10 @@ class Studio:
         data, site = source.data, dict[str, object](site=source.site)
         is_saved = order.get("commit") is True  # what is no motion is not
         task = Task.CHECK if is_saved else Task.DRAFT
-        shown = self._run(data, task, chosen=chosen, longest=LONGEST_SOLVE)
+        try:
+            shown = self._run(data, task, chosen=chosen, longest=LONGEST_SOLVE)
+        except StudioError as error:
+            raise StudioError(refusal(str(error), self._project.saved, data)) from error
         if self._is_solved and not shown.is_solved:
             after = f" in {LONGEST_SOLVE:g} s of work" if shown.content is None else ""
             told = f"no way to do it was found{after}; the motion is as it was."

@@ -10,6 +10,7 @@ import pytest
 from controller.studio.certifying import around, runs_of
 from controller.studio.orders import STOPPED, Doing
 from controller.studio.session import Studio
+from controller.sweeps import run
 from controller.sweeps.summary import rate_interval
 from go2_wbc.errors import StudioError
 from go2_wbc.world import DOUBTFUL, World
@@ -32,7 +33,8 @@ RUNS = 4
 def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Studio]:
     path = tmp_path_factory.mktemp("studio") / "nod.py"
     path.write_text(NOD, encoding="utf-8")
-    with Studio(path, None, 0) as opened:
+    with Studio(path, None, 0) as opened, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run, "processors", lambda: 1)  # another worker starts longer than it runs
         yield opened
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,7 +28,7 @@ from motions import Timeline, deg, motion
 @motion
 def nod() -> Timeline:
     """Nod."""
-    return Timeline().body(pitch=deg(8.0), over=0.5).home(over=0.5)
+    return Timeline().body(pitch=deg(8.0), over=0.3).home(over=0.3)
 
 
 @motion
@@ -52,10 +51,6 @@ def studio(file: Path) -> Iterator[Studio]:
         yield opened
 
 
-def _pytest(path: Path) -> subprocess.CompletedProcess[str]:
-    return pytest_with("motions.pytest_plugin", path.parent, path.name)
-
-
 @pytest.mark.parametrize("kind", ["csv", "npz", "json", "plan"])
 def test_it_is_written_as_the_command_line_writes_it_and_over_one_only_again(
     studio: Studio, file: Path, tmp_path: Path, kind: str
@@ -63,6 +58,7 @@ def test_it_is_written_as_the_command_line_writes_it_and_over_one_only_again(
     path, by_command = file.with_name(f"nod.{kind}"), tmp_path / f"nod.{kind}"
     answer = studio.export({"kind": kind})
     assert (answer["told"], answer["file"]) == (f"wrote {path.name}", path.name)
+    assert answer["folder"] == str(file.parent.resolve())
     assert main(["export", f"{file}:nod", "--out", str(by_command)]) == 0
     assert path.read_bytes() == by_command.read_bytes()
     path.write_text("mine", encoding="utf-8")
@@ -81,7 +77,7 @@ def test_a_saved_motion_and_a_plan_are_played_by_the_command_that_is_told(
         answer = studio.export({"kind": kind, "again": True})
         assert answer["then"] == f"go2-wbc run nod.{kind}"
         plan = checker.plan(load(file.with_name(f"nod.{kind}")))
-        assert (plan.name, plan.duration) == ("nod", pytest.approx(1.0, abs=0.3))
+        assert (plan.name, plan.duration) == ("nod", pytest.approx(0.6, abs=0.3))
 
 
 def test_what_is_told_of_a_plan_for_a_bridge_is_a_command_that_takes_it(
@@ -99,16 +95,16 @@ def test_what_is_told_of_a_plan_for_a_bridge_is_a_command_that_takes_it(
     monkeypatch.setitem(sys.modules, "controller.bridges.ros2.server", server)
     monkeypatch.chdir(file.parent)
     for kind, part in (("ros2", "plays by its name"), ("unitree", "the domain 0")):
-        answer = studio.export({"kind": kind, "again": True})
-        assert answer["file"] == "nod.plan"
+        answer = studio.export({"kind": kind})
+        assert answer["file"] == f"nod.{kind}.plan", "each kind has a name of its own"
         assert part in str(answer["told"])
         program, *arguments = shlex.split(str(answer["then"]))
         assert program == "go2-wbc"
         assert main(arguments) == 0
     saved, *driven = seen
     assert isinstance(saved, SavedMotions)
-    assert saved.read("nod.plan").name == "nod"
-    assert driven == [["stand", "nod.plan", "lie_down"], ("lo", 1)]
+    assert saved.read("nod.ros2.plan").name == "nod"
+    assert driven == [["stand", "nod.unitree.plan", "lie_down"], ("lo", 1)]
 
 
 def test_a_film_without_its_extra_is_told_of_before_the_work(
@@ -140,10 +136,8 @@ def test_a_written_test_passes_of_what_the_robot_can_do_fails_of_what_it_cannot_
     answer = studio.export({"kind": "test"})
     path = file.with_name("test_nod.py")
     told = {"told": "wrote test_nod.py", "file": path.name, "then": "pytest test_nod.py"}
+    told["folder"] = str(path.parent.resolve())
     assert answer == told
-    done = _pytest(path)
-    assert done.returncode == 0, done.stdout
-    assert "1 passed" in done.stdout
     own = path.read_text(encoding="utf-8") + "\n# mine\n"
     path.write_text(own, encoding="utf-8")
     for again in (False, True):
@@ -152,8 +146,9 @@ def test_a_written_test_passes_of_what_the_robot_can_do_fails_of_what_it_cannot_
         assert path.read_text(encoding="utf-8") == own
     assert studio.choose({"motion": "lean"}) == {}
     assert studio.export({"kind": "test"})["file"] == "test_lean.py"
-    done = _pytest(file.with_name("test_lean.py"))
-    assert done.returncode == 1
+    done = pytest_with("motions.pytest_plugin", file.parent, path.name, "test_lean.py")
+    assert done.returncode == 1, done.stdout
+    assert "1 failed, 1 passed" in done.stdout
     assert "the robot cannot do 'lean'" in done.stdout
     assert studio.choose({"motion": "nod"}) == {}
 

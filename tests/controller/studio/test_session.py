@@ -160,8 +160,8 @@ def test_an_edit_is_saved_shown_and_undone(studio: Studio, file: Path) -> None:
 
 def test_what_the_language_refuses_is_not_written(studio: Studio, file: Path) -> None:
     answer = _edit(studio, 2, op="delete")
-    assert "foot FR is not raised" in answer["error"]
-    assert "line 13" in answer["error"]
+    told = "the front right foot is not up there: raise it before (line 13)"
+    assert answer["error"] == told
     assert file.read_text(encoding="utf-8") == GREET
 
 
@@ -228,7 +228,8 @@ def test_physics_plays_it_beside_the_plan(studio: Studio) -> None:
 
 def test_what_is_exported_lies_beside_the_file(studio: Studio, file: Path) -> None:
     page = file.with_suffix(".html")
-    wrote = {"told": "wrote greet.html", "file": "greet.html"}
+    folder = str(file.parent.resolve())
+    wrote = {"told": "wrote greet.html", "file": "greet.html", "folder": folder}
     assert studio.export({"kind": "html"}) == wrote
     before = page.read_text(encoding="utf-8")
     assert "class Studio" not in before

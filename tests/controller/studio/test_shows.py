@@ -87,6 +87,6 @@ def test_the_studio_shows_it_judges_it_and_takes_it_back(tmp_path: Path) -> None
         assert studio.look() or studio.look()
         refused = file.read_bytes()
         told = str(studio.edit({**show, "base": studio._project.base}))
-        assert "then()" in told, "the first does not come home"
+        assert "the trunk is higher or lower" in told, "the first does not come home"
         assert file.read_bytes() == refused
         assert studio.motion == "bow"

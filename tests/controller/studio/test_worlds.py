@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from controller.report_view import verdict_of
+from controller.studio.plain import _words
 from controller.studio.session import Studio
 from controller.studio.worlds import world_of
 from go2_wbc.world import World
@@ -95,7 +96,7 @@ def test_an_edit_in_another_world_is_checked_as_if_nothing_was_kept(
     told = header["verdict"]
     assert (told["text"], told["chance"]) == (whole.text, pytest.approx(whole.chance, abs=CLOSE))
     shown = [(one["limit"], one["subject"], one["text"]) for one in told["annotations"]]
-    assert shown == [(one.limit, one.subject, one.text) for one in whole.annotations]
+    assert shown == [(one.limit, one.subject, _words(one)) for one in whole.annotations]
     assert studio.edit({"op": "undo"}) == {}, "of the text, not of the world"
     assert _header(studio)["editor"]["world"]["told"] == str(world_of(ICE))
     assert file.read_text(encoding="utf-8") == TURN

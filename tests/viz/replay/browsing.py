@@ -35,7 +35,7 @@ _DRAW_WHEN_LOOKED_AT = """(() => {
 0.4 s of processor, the first one 1 s."""
 STAGE = (20, 60, 955, 440)
 """Left, top, right, bottom [px] of the 3D view without its buttons, in a window of 1280 by 720."""
-_SIZE = (1280, 720)
+SIZE = (1280, 720)  #: Width and height [px] of the window as it is opened
 _SOFTWARE_GL = [
     "--use-gl=angle",
     "--use-angle=swiftshader",
@@ -78,14 +78,10 @@ class Tab:
         requested: addresses that it asked for, without those inside itself.
     """
 
-    def __init__(
-        self, browser: Browser, *, offline: bool = False, is_dark: bool = False, touch: bool = False
-    ) -> None:
+    def __init__(self, browser: Browser, *, offline: bool = False) -> None:
         self._context = browser.new_context(
-            viewport={"width": _SIZE[0], "height": _SIZE[1]},
+            viewport={"width": SIZE[0], "height": SIZE[1]},
             offline=offline,
-            color_scheme="dark" if is_dark else "light",
-            has_touch=touch,
             reduced_motion="reduce",  # drawing each frame in software would cost most of the time
         )
         self._context.set_default_timeout(_PATIENCE)

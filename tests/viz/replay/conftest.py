@@ -41,10 +41,17 @@ def open_page(chromium_browser: Browser, tmp_path_factory: pytest.TempPathFactor
     return opened
 
 
+@pytest.fixture(scope="package")
+def studio_page(chromium_browser: Browser) -> Iterator[Tab]:
+    """One for all studios: the next one opens in half the time where one was open before."""
+    with Tab(chromium_browser) as tab:
+        yield tab
+
+
 @pytest.fixture(scope="module")
-def studio(file: Path, chromium_browser: Browser) -> Iterator[Tab]:
+def studio(file: Path, studio_page: Tab) -> Iterator[Tab]:
     """The studio's page with the ``file`` of the module, by one who needs no tour."""
-    with served(file) as url, studio_tab(url, chromium_browser) as tab:
+    with served(file) as url, studio_tab(url, studio_page) as tab:
         tab.page.get_by_role("button", name="Skip the tour").click()
         yield tab
 

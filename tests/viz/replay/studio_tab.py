@@ -6,14 +6,10 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from controller.cli.motion_preview import POLL_PERIOD
 from controller.studio.session import Studio
 from tests.viz.replay.browsing import Tab
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser
 
 SETTLED = "!studio.isBusy && !studio.waiting"
 
@@ -38,14 +34,16 @@ def served(file: Path) -> Iterator[str]:
 
 
 @contextmanager
-def studio_tab(url: str, browser: Browser) -> Iterator[Tab]:
+def studio_tab(url: str, tab: Tab) -> Iterator[Tab]:
     """The page as it is opened first; it must not complain, nor ask another server."""
-    with Tab(browser) as tab:
-        tab.open(url)
-        tab.wait_for("window.studio && replay.version")
-        yield tab
-        assert tab.complaints == []
-        assert all(one.startswith(url.partition("?")[0]) for one in tab.requested)
+    tab.complaints.clear()
+    tab.requested.clear()
+    tab.open(url)
+    tab.wait_for("window.studio && replay.version")
+    yield tab
+    assert tab.complaints == []
+    assert all(one.startswith(url.partition("?")[0]) for one in tab.requested)
+    tab.page.goto("about:blank")  # its server ends
 
 
 def do(tab: Tab, gesture: str) -> None:

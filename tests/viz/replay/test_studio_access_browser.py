@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Literal
 
 import pytest
 
-from tests.viz.replay.browsing import Tab
-from tests.viz.replay.studio_tab import SETTLED, served
+from tests.viz.replay.browsing import SIZE, Tab
+from tests.viz.replay.studio_tab import SETTLED
 from tests.viz.replay.test_studio_hands_browser import DANCE
 
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser
-
 pytestmark = pytest.mark.slow
+STATES = (
+    *("studio.tools.told", "studio.tour.end()", "studio.select(0)", "studio.world.open()"),
+    "studio.tools.help()",
+)
+"""The tour, nothing chosen, a limit broken, the world, the keys."""
+AS_AT_FIRST = """document.getElementById('keys').close(), studio.world.box.open = false,
+    studio.choose([]), studio.redraw(), studio.tour.start()"""
 SIZES = ((1400, 900), (800, 1000), (390, 844))
 CONTRAST = 4.5
 """Of text and what is behind it, at the least (WCAG 2.1, 1.4.3, level AA)."""
@@ -71,90 +74,89 @@ FINDINGS = """(() => {
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Path]]:
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("studio") / "dance.py"
     path.write_text(DANCE.replace("over=0.6).home", "pitch=deg(41.0), over=0.6).home", 1))
-    with served(path) as url:
-        yield url, path
+    return path
 
 
-def _open(tab: Tab, url: str) -> None:
-    tab.open(url)
-    tab.wait_for("window.studio && replay.version")
+@pytest.fixture
+def begun(tab: Tab) -> Tab:
+    """The page as it is opened first: with its tour, nothing chosen."""
+    tab.evaluate("document.activeElement.blur(), studio.choose([]), studio.tour.start()")
+    return tab
 
 
-@pytest.mark.parametrize("is_dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize("scheme", ["dark", "light"])
 def test_everything_has_a_name_and_can_be_read(
-    opened: tuple[str, Path], chromium_browser: Browser, is_dark: bool
+    begun: Tab, scheme: Literal["dark", "light"]
 ) -> None:
-    states = (
-        *("studio.tools.told", "studio.tour.end()", "studio.select(0)", "studio.world.open()"),
-        "studio.tools.help()",
-    )
-    with Tab(chromium_browser, is_dark=is_dark) as tab:
-        _open(tab, opened[0])
-        for state in states:  # the tour, nothing chosen, a limit broken, the world, the keys
+    tab = begun
+    with tab.page.expect_navigation():  # its 3D view and charts take their colours as it is loaded
+        tab.page.emulate_media(color_scheme=scheme)
+    tab.wait_for("window.studio && replay.version")
+    tab.evaluate("studio.tour.start()")
+    for width, height in SIZES:
+        tab.resize(width, height)
+        for state in STATES:
             tab.evaluate(state)
-            for width, height in SIZES:
-                tab.resize(width, height)
-                checked, found = tab.evaluate(FINDINGS)
-                assert found == [], (state, width)
-                assert checked > 40
-                assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth"), width
-        assert tab.complaints == []
+            checked, found = tab.evaluate(FINDINGS)
+            assert found == [], (state, width)
+            assert checked > 40
+            assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth"), width
+        tab.evaluate(AS_AT_FIRST)
+    tab.evaluate("studio.tour.end()")
+    tab.resize(*SIZE)
 
 
-def test_what_is_wrong_is_found(opened: tuple[str, Path], chromium_browser: Browser) -> None:
-    with Tab(chromium_browser) as tab:
-        _open(tab, opened[0])
-        tab.evaluate("studio.tour.end()")
-        tab.evaluate("document.querySelector('[aria-label=Export]').removeAttribute('aria-label')")
-        tab.evaluate("document.querySelector('#studio-tools b').style.color = '#aaaaaa'")
-        found = " ".join(tab.evaluate(FINDINGS)[1])
+def test_what_is_wrong_is_found(tab: Tab) -> None:
+    tab.evaluate(
+        "window.list = document.querySelector('[aria-label=Export]'),"
+        " window.word = document.querySelector('#studio-tools b'),"
+        " list.removeAttribute('aria-label'), word.style.color = '#aaaaaa'"
+    )
+    found = " ".join(tab.evaluate(FINDINGS)[1])
     assert "no name: <select" in found
     assert "contrast 2.3" in found
+    tab.evaluate("list.setAttribute('aria-label', 'Export'), word.style.color = ''")
 
 
-def test_a_motion_is_edited_with_keys_alone(
-    opened: tuple[str, Path], chromium_browser: Browser
-) -> None:
-    url, path = opened
-    before = path.read_text(encoding="utf-8")
-    with Tab(chromium_browser) as tab:
-        _open(tab, url)
-        press = tab.page.keyboard.press
-        press("Escape")  # the tour
-        assert tab.evaluate("document.getElementById('tour') === null")
-        press("l")
-        press("ArrowRight")
-        press("Enter")
-        assert tab.evaluate("studio.bar().name") == "home"
-        press("e")
-        tab.page.keyboard.type("0.9")  # what is in a field that is reached by a key is replaced
-        press("Enter")
-        tab.wait_for(f"{SETTLED} && studio.editor.undo")
-        assert ".home(over=0.9)" in path.read_text(encoding="utf-8")
-        press("Escape")
-        press("Control+z")
-        tab.wait_for(f"{SETTLED} && !studio.editor.undo")
-    assert path.read_text(encoding="utf-8") == before
+def test_a_motion_is_edited_with_keys_alone(begun: Tab, file: Path) -> None:
+    tab, before = begun, file.read_text(encoding="utf-8")
+    press = tab.page.keyboard.press
+    press("Escape")  # the tour
+    assert tab.evaluate("document.getElementById('tour') === null")
+    press("l")
+    press("ArrowRight")
+    press("Enter")
+    assert tab.evaluate("studio.bar().name") == "home"
+    press("e")
+    tab.page.keyboard.type("0.9")  # what is in a field that is reached by a key is replaced
+    press("Enter")
+    tab.wait_for(f"{SETTLED} && studio.editor.undo")
+    assert ".home(over=0.9)" in file.read_text(encoding="utf-8")
+    press("Escape")
+    press("Control+z")
+    tab.wait_for(f"{SETTLED} && !studio.editor.undo")
+    assert file.read_text(encoding="utf-8") == before
 
 
-def test_two_fingers_zoom_the_time(opened: tuple[str, Path], chromium_browser: Browser) -> None:
-    with Tab(chromium_browser, touch=True) as tab:
-        _open(tab, opened[0])
-        tab.evaluate("studio.tour.end()")
-        tab.resize(800, 1000)
-        whole = tab.evaluate("studio.view.length")
-        box: Any = tab.page.locator("#bars").bounding_box()
-        y, middle = box["y"] + 12, box["x"] + box["width"] / 2
-        session = tab.page.context.new_cdp_session(tab.page)
-        for kind, apart in (("touchStart", 60), ("touchMove", 120), ("touchMove", 240)):
-            points = [
-                {"x": middle + side * apart / 2, "y": y, "id": n} for n, side in enumerate((-1, 1))
-            ]
-            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
-        session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
-        tab.wait_for(f"studio.view.length < 0.5 * {whole}")
-        assert tab.is_shown("#overview")
-        assert tab.evaluate("studio.chosen.size") == 0
+def test_two_fingers_zoom_the_time(tab: Tab) -> None:
+    tab.evaluate("studio.choose([]), studio.redraw()")
+    tab.resize(800, 1000)
+    whole = tab.evaluate("studio.view.length")
+    box: Any = tab.page.locator("#bars").bounding_box()
+    y, middle = box["y"] + 12, box["x"] + box["width"] / 2
+    session = tab.page.context.new_cdp_session(tab.page)
+    session.send("Emulation.setTouchEmulationEnabled", {"enabled": True})
+    for kind, apart in (("touchStart", 60), ("touchMove", 120), ("touchMove", 240)):
+        points = [
+            {"x": middle + side * apart / 2, "y": y, "id": n} for n, side in enumerate((-1, 1))
+        ]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+    session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    tab.wait_for(f"studio.view.length < 0.5 * {whole}")
+    assert tab.is_shown("#overview")
+    assert tab.evaluate("studio.chosen.size") == 0
+    session.detach()
+    tab.resize(*SIZE)

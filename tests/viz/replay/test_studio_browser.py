@@ -1,20 +1,16 @@
-"""``go2-wbc studio`` as a user sees it: bars are dragged, and the file says what the page shows."""
+"""The studio as a user sees it: bars are dragged, and the file says what the page shows."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from tests.controller.studio.test_session import GREET
-from tests.live_preview import LivePreview
 from tests.viz.replay.browsing import Tab
-from tests.viz.replay.studio_tab import SETTLED, studio_tab
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+from tests.viz.replay.studio_tab import SETTLED, served, studio_tab
 
 pytestmark = pytest.mark.slow
 TRIANGLES = """(() => {
@@ -34,9 +30,8 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def studio(file: Path, chromium_browser: Browser) -> Iterator[Tab]:
-    program = LivePreview(str(file), command="studio")
-    with program as opened, studio_tab(opened.url, chromium_browser) as tab:
+def studio(file: Path, studio_page: Tab) -> Iterator[Tab]:
+    with served(file) as url, studio_tab(url, studio_page) as tab:
         for _ in range(4):  # who opens it first is shown around
             tab.page.get_by_role("button", name="Next").click()
         tab.page.get_by_role("button", name="Done").click()
@@ -132,6 +127,7 @@ def test_a_number_is_typed_and_a_broken_limit_is_red(tab: Tab, file: Path) -> No
     tab.wait_for("document.querySelector('[data-bar=\"0\"]').classList.contains('broken')")
     tab.wait_for(SETTLED)
     assert "pitch=deg(41.2)" in file.read_text(encoding="utf-8")
+    assert tab.text("#inspector h2").startswith("Nose down 41.2°"), "as its bar"
     assert "broken" in tab.text("#badge")
     assert tab.evaluate("replay.time") == pytest.approx(0.6), "the pose it leads to is shown"
     tab.page.locator("[data-ask=mend]").click()
@@ -188,7 +184,7 @@ def test_a_move_is_inserted_and_one_that_is_refused_is_told(tab: Tab, file: Path
     before = file.read_text(encoding="utf-8")
     tab.page.locator("[data-bar='3']").click()
     tab.click("[data-op=delete]")
-    tab.wait_for(f"{SAID}.includes('foot FR is not raised')")
+    tab.wait_for(f"{SAID}.includes('the front right foot is not up there')")
     tab.wait_for(SETTLED)
     assert file.read_text(encoding="utf-8") == before
     assert tab.evaluate("studio.selected") == 3, "still that one"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from controller.sweeps import run
 from tests.controller.studio.test_certifying import NOD
-from tests.viz.replay.browsing import Tab
+from tests.viz.replay.browsing import SIZE, Tab
 from tests.viz.replay.studio_tab import SETTLED, undo_all
 from tests.viz.replay.test_studio_access_browser import FINDINGS
 
@@ -18,10 +20,12 @@ ROWS = "#certified tbody tr"
 
 
 @pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def file(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     path = tmp_path_factory.mktemp("studio") / "nod.py"
     path.write_text(NOD, encoding="utf-8")
-    return path
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run, "processors", lambda: 1)  # another worker starts longer than it runs
+        yield path
 
 
 def _hear(tab: Tab, act: str) -> None:
@@ -54,6 +58,20 @@ def test_the_interval_is_told_run_by_run_and_stays_as_a_row(tab: Tab, file: Path
     assert cells[2:] == ["3 of 3", "29.2 % to 100 %"]
     assert tab.text("#certificate summary b") == "Certificate: done in 3 of 3 runs"
     assert tab.evaluate(FINDINGS)[1] == []
+    for width in (1280, 800):
+        tab.resize(width, 720)
+        heights = tab.evaluate(
+            f"[...document.querySelector('{ROWS}').children].map((cell) => cell.clientHeight)"
+        )
+        assert max(heights[0], *heights[2:]) < 25, "one line, px"
+    tab.resize(*SIZE)
+    tab.evaluate(
+        "showTrust({ ...replay.data.header.verdict, chance: 0.9, certified: {"
+        " ...replay.data.header.verdict.certified, interval: [0, 0.2],"
+        " why: '3 of 3 runs failed: fell' } })"
+    )
+    assert tab.text("#certificate .warning") == "3 of 3 runs failed: fell"
+    assert tab.evaluate("document.querySelector('#chance b').className") == "unlikely"
     assert file.read_text(encoding="utf-8") == NOD
     tab.evaluate("studio.set(studio.editor.bars[0], 'over', 0.7, true)")
     tab.wait_for(f"{SETTLED} && studio.editor.undo")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.viz.replay.browsing import Tab
-from tests.viz.replay.studio_tab import SETTLED, do
+from tests.viz.replay.studio_tab import SETTLED, do, undo_all
 from viz.style import LEG_COLORS
 
 if TYPE_CHECKING:
@@ -45,9 +45,30 @@ def _index(tab: Tab, name: str) -> int:
     return tab.evaluate(f"studio.editor.bars.findIndex((bar) => bar.name === '{name}')")
 
 
+def test_what_needs_the_way_home_first_is_refused_in_words_and_inserted_with_it(
+    tab: Tab, file: Path
+) -> None:
+    tab.evaluate("studio.playBehind('bow')")
+    tab.wait_for(f"{SETTLED} && {SAID}.includes('All home before it')")
+    assert tab.text("#studio-say") == (
+        "it starts standing at home, and there the front right foot is up."
+        " All home before it does that (line 13)"
+    )
+    assert file.read_text(encoding="utf-8") == FEET
+    tab.page.get_by_role("button", name="All home, then Bow").click()
+    tab.wait_for(f"{SETTLED} && studio.editor.bars.some((bar) => bar.parts[0] === 'time')")
+    tab.wait_for(f"{SETTLED} && {SAID} === 'saved' && studio.bar().name === 'then'")
+    assert '.home(over=0.8).then(find_motion("bow")())' in "".join(file.read_text("utf-8").split())
+    undo_all(tab, file, FEET)
+
+
 def test_what_is_missing_at_the_end_is_one_button(tab: Tab, file: Path) -> None:
     assert tab.text(WHY).startswith("The motion is not over: it must end at rest on four feet")
-    tab.page.get_by_role("button", name="Add All home").click()
+    tab.evaluate("document.activeElement.blur()")
+    tab.page.keyboard.press("r")
+    tab.wait_for(f"{SAID} === 'only its way home is missing: one click adds that'")
+    assert tab.page.locator("#studio-why").get_by_role("button", name="Add All home").is_visible()
+    tab.page.locator("#studio-changes").get_by_role("button", name="Add All home").click()
     tab.wait_for(f"{SAID} === 'saved'")
     tab.wait_for(SETTLED)
     assert '.foot("FR", z=0.08, over=0.5).home(over=0.8)\n' in file.read_text(encoding="utf-8")
@@ -65,6 +86,11 @@ def test_why_a_bar_is_red_stands_in_view_however_many_lanes_there_are(
     do(tab, f"studio.select({body})")
     broken = tab.evaluate("studio.bar().broken")
     assert tab.text(WHY) == f"Sink 20 cm: {broken}"
+    assert tab.page.locator("[data-slot=z]").input_value() == "-20"
+    assert (
+        tab.evaluate("studio.inspector.box.querySelector('[data-slot=z] + small').textContent")
+        == "cm"
+    )
     if size[0] < 820:  # there the page scrolls: the reason is at the bars
         tab.page.locator("#bars").scroll_into_view_if_needed()
     box = tab.page.locator(WHY).first.bounding_box() or {}
@@ -150,10 +176,10 @@ def test_all_kinds_are_exported_from_one_list_by_keys(tab: Tab, file: Path) -> N
     assert len({word[0] for word in words}) == len(words), "each by a key of its own"
     exports.focus()
     tab.page.keyboard.press("t")
-    tab.wait_for(f"{SAID} === 'wrote test_feet.py; next: pytest test_feet.py'")
+    tab.wait_for(f"{SAID} === 'wrote test_feet.py in {file.parent}; next: pytest test_feet.py'")
     assert "def test_the_robot_can_do_feet" in file.with_name("test_feet.py").read_text("utf-8")
     exports.select_option("npz")
-    tab.wait_for(f"{SAID} === 'wrote feet.npz'")
+    tab.wait_for(f"{SAID} === 'wrote feet.npz in {file.parent}'")
     answer = tab.page.request.get(tab.page.get_by_role("link").evaluate("(a) => a.href"))
     assert answer.body() == file.with_name("feet.npz").read_bytes()
     assert answer.headers["content-type"] == "application/octet-stream"
@@ -161,7 +187,7 @@ def test_all_kinds_are_exported_from_one_list_by_keys(tab: Tab, file: Path) -> N
 
 def test_what_was_exported_is_a_link_to_it(tab: Tab, file: Path) -> None:
     do(tab, "studio.export('html')")
-    tab.wait_for(f"{SAID} === 'wrote feet.html'")
+    tab.wait_for(f"{SAID} === 'wrote feet.html in {file.parent}'")
     with tab.page.context.expect_page() as opened:
         tab.page.get_by_role("link", name="feet.html").click()
     page = opened.value

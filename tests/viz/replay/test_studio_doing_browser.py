@@ -47,7 +47,7 @@ def _ask_for(tab: Tab, height: float) -> None:
     tab.page.locator("[data-bar='2']").click()
     field = tab.page.locator("[data-slot=height]")
     field.select_text()
-    field.press_sequentially(str(height))
+    field.press_sequentially(f"{100 * height:g}")  # cm
     field.press("Enter")
     tab.wait_for(f"!{DOING}.hidden && {DOING}.textContent.includes('s of at most 2 s')")
 
@@ -66,7 +66,7 @@ def test_a_jump_that_is_solved_is_told_and_cancelled(tab: Tab, file: Path, how: 
     tab.wait_for(SETTLED)
     assert tab.text("#studio-say") == "Jump 29.7 cm: stopped: the motion is as it was"
     assert file.read_text(encoding="utf-8") == LEAP
-    assert tab.page.locator("[data-slot=height]").input_value() == "0.1", "what was kept"
+    assert tab.page.locator("[data-slot=height]").input_value() == "10", "what was kept"
     assert tab.evaluate("studio.bar().broken") == ""
     tab.wait_for(f"{DOING}.hidden")
 

@@ -11,7 +11,7 @@ import pytest
 
 from motions.music import click_track
 from tests.viz.replay.browsing import Tab
-from tests.viz.replay.studio_tab import SETTLED
+from tests.viz.replay.studio_tab import SETTLED, do
 
 if TYPE_CHECKING:
     pass
@@ -227,17 +227,25 @@ def test_a_bar_ends_on_a_beat_of_the_song(tab: Tab, file: Path) -> None:
     beats = tab.evaluate("studio.music.beats")
     assert tab.text("#tempo") == "100 beats/min"
     assert tab.evaluate("replay.sound.audio !== null")
+    assert tab.evaluate("studio.music.first.selectedOptions[0].text") == "Bars of 4, from beat 1"
+    tab.page.get_by_label("Bars begin on").select_option("Bars of 4, from beat 3")
+    assert tab.evaluate("studio.music.downbeat") == 2
     box = tab.page.locator("[data-bar='0']").bounding_box() or {}
     right, middle = box["x"] + box["width"], box["y"] + box["height"] / 2
     second = box["width"] / 0.6
-    tab.page.mouse.move(right - 3, middle)
-    tab.page.mouse.down()
-    tab.page.mouse.move(right - 3 + 0.5 * second + 2, middle, steps=3)
-    tab.page.mouse.up()
-    tab.wait_for(SETTLED)
-    end = _number(file, r"body\(z=-LOW, over=([\d.]+), ease=\"cubic\"\)")  # it turns back there
-    assert np.abs(np.array(beats) - end).min() < 0.001
-    assert abs((end - 0.5 + 0.3) % 0.6 - 0.3) < ON_BEAT, "a click track of 100 begins at 0.5 s"
+    for ease in ("", r", ease=\"cubic\""):  # it turns back there, where that is asked for
+        tab.page.mouse.move(right - 3, middle)
+        tab.page.mouse.down()
+        tab.page.mouse.move(right - 3 + 0.5 * second + 2, middle, steps=3)
+        tab.page.mouse.up()
+        tab.wait_for(SETTLED)
+        end = _number(file, rf"body\(z=-LOW, over=([\d.]+){ease}\)")
+        assert np.abs(np.array(beats) - end).min() < 0.001
+        assert abs((end - 0.5 + 0.3) % 0.6 - 0.3) < ON_BEAT, "a click track of 100 begins at 0.5 s"
+        do(tab, "studio.act('undo')")
+        tab.evaluate("studio.music.accent.click()")
+    assert tab.evaluate("studio.music.accent.getAttribute('aria-pressed')") == "false"
+    do(tab, "studio.act('redo')")
     tab.page.get_by_label("Music", exact=True).select_option(index=0)
     tab.wait_for("replay.sound.audio === null")
 

@@ -64,6 +64,8 @@ def test_it_is_seen_beside_ones_own_and_left(tab: Tab, file: Path) -> None:
     assert tab.text("#who") == "Solid: the plan. Blue: the nearest that the robot can do."
     assert tab.text("[data-ghost=ghost]") == "Nearest: beside"
     assert tab.text("#badge") == "5 limits broken", "that is one's own"
+    assert tab.text("#force-key") == "planned force"
+    assert tab.text("#ghost-force-key") == "force of the blue one"
     assert np.abs(tab.stage() - before).max() > 50.0, "a ghost in the 3D view"
     assert tab.evaluate(RED) == [True, False], "one's own is red"
     assert curve == 0

@@ -71,7 +71,7 @@ def test_a_bar_of_another_file_is_shown_there_and_written_out_here(tab: Tab, fil
     _choose(tab, bar, "Show steps_beside.py, line 5")
     assert ".body(z=-0.03" in tab.text("#proposal .meant")
     tab.page.keyboard.press("Escape")
-    assert tab.evaluate("document.querySelector('#proposal')") is None
+    tab.wait_for("document.querySelector('#proposal') === null")
     _choose(tab, bar, "Write it out")
     tab.page.get_by_role("button", name="Write it", exact=True).click()
     tab.wait_for("studio.editor.bars.every((bar) => !bar.file)")

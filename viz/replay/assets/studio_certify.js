@@ -19,14 +19,14 @@ class Certify {
   async play(runs) {
     const answer = await this.studio.ask("certify", "", { runs: Number(runs) });
     if (!answer.row) return;
-    const { motion, n, done, interval: [low, high], world, base } = answer.row;
-    const told = [readable(motion), world, `${done} of ${n}`, `${percent(low)} to ${percent(high)}`];
+    const { motion, n, done, interval: [low, high], world, base, why } = answer.row;
+    const told = [readable(motion), world, `${done} of ${n}`, `${percent(low)} to ${percent(high)}`, ...(why ? [why] : [])];
     const row = element("tr", { title: "" });
     row.dataset.base = base;
     row.append(...told.map((text) => element("td", { textContent: text })));
     this.rows.prepend(row);
     this.box.hidden = false;
-    this.studio.tell(`certified: done in ${told[2]} runs, 95 % interval ${told[3]}`);
+    this.studio.tell(`certified: done in ${told[2]} runs, 95 % interval ${told[3]}${why && `; ${why}`}`, done < n / 2);
     this.use(this.studio.editor);
   }
 

@@ -2,6 +2,7 @@
 // What goes on meanwhile, with a way to end it; and why a bar is red, where it is seen.
 
 const LAST_CALL = "All home"; // of the palette; the server says where it is missing
+const HOME_FIRST = "All home before it"; // in what the server says of a move that starts at home
 const LINGERS = 400; // ms, so long it stays after the last word of it
 
 class Doing {
@@ -73,10 +74,30 @@ class Doing {
     const reason = element("button", { textContent: text, title: "Go there" });
     reason.addEventListener("click", () => (bar ? studio.select(bars.indexOf(bar)) : studio.player.scrub((end ?? limit).time)));
     this.why.replaceChildren(reason);
-    if (!end) return;
-    const mend = element("button", { textContent: `Add ${LAST_CALL}`, title: "Puts the call at the end of the motion" });
-    mend.addEventListener("click", () => studio.send({ op: "last", title: LAST_CALL }, true));
-    this.why.append(mend);
+    this.why.append(...buttonsOf(this.missing(annotations)).children);
+  }
+
+  // The way home, as a button, where a motion ends without it.
+  missing(annotations) {
+    if (!annotations.some((one) => one.is_broken && one.text.includes(LAST_CALL))) return [];
+    const act = () => this.studio.send({ op: "last", title: LAST_CALL }, true);
+    return [{ text: `Add ${LAST_CALL}`, hint: "Puts the call at the end of the motion", act }];
+  }
+
+  // What has to start at home gets a button that inserts the way there before it.
+  /**
+   * @param {Order} order
+   * @param {string} error
+   */
+  refused({ op, title, name }, error) {
+    const { studio } = this;
+    studio.inspector.forget();
+    if (!error.includes(HOME_FIRST)) return;
+    const next = () => (op === "insert" ? studio.insert(title) : studio.playBehind(name));
+    studio.tools.offer([{
+      text: `${LAST_CALL}, then ${readable(String(title ?? name))}`, hint: "Inserts both, one after the other",
+      act: async () => { await studio.insert(LAST_CALL); next(); },
+    }]);
   }
 
   // Why an order was refused; of a jump and a split also of what.
@@ -87,6 +108,7 @@ class Doing {
   worded(order, error) {
     const bar = this.studio.editor.bars.find((one) => isAt(one, /** @type {[number, number]} */ (order.site ?? [0, 0])));
     const isOf = bar && (order.op === "split" || bar.parts.includes("robot"));
+    if (error && order.op === "insert") return `${order.title}: ${error}`;
     return error && isOf ? `${order.op === "split" ? described(bar)[0] : this.asked}: ${error}` : error;
   }
 

@@ -30,9 +30,9 @@ class Inspector {
       return rows.replaceChildren();
     }
     const times = bar.runs > 1 ? `, runs ${bar.runs} times` : "";
-    const more = count > 1 ? ` and ${count - 1} more` : "";
+    this.more = count > 1 ? ` and ${count - 1} more` : "";
     const where = isOwn(bar) ? `line ${bar.site[0]}${times}` : `in ${placeOf(bar)}`;
-    title.replaceChildren(element("b", { textContent: described(bar)[0] + more }), ` ${bar.name}(), ${where}`);
+    title.replaceChildren(element("b", { textContent: described(bar)[0] + this.more }), ` ${bar.name}(), ${where}`);
     rows.replaceChildren(...bar.slots.map((slot) => this.row(bar, slot, editor, timeUnit)));
     if (!isOwn(bar)) rows.append(element("p", { textContent: elsewhere(bar, editor.bars) }));
     if (bar.broken) rows.append(element("p", { className: "broken", textContent: bar.broken }));
@@ -73,7 +73,7 @@ class Inspector {
   follow(values) {
     for (const [name, value] of Object.entries(values)) {
       const input = this.box.querySelector(`[data-slot="${name}"]`);
-      if (input && input !== document.activeElement) input.value = value;
+      if (input && input !== document.activeElement) input.value = shownAs(value, input.dataset.scale);
     }
   }
 
@@ -81,10 +81,15 @@ class Inspector {
   /** @param {Bar} bar */
   refresh(bar) {
     this.bar = bar;
-    for (const { name, value } of bar.slots) {
-      const input = this.box.querySelector(`[data-slot="${name}"]`);
-      if (input && input !== document.activeElement) input.value = value;
-    }
+    this.entitle(bar);
+    this.follow(Object.fromEntries(bar.slots.map(({ name, value }) => [name, value])));
+  }
+
+  // What the call does with the values that it has now.
+  /** @param {Bar} [bar] */
+  entitle(bar) {
+    const title = this.box.querySelector("h2 b");
+    if (bar && title) title.textContent = described(bar)[0] + this.more;
   }
 
   /**
@@ -97,7 +102,7 @@ class Inspector {
     this.bar = bar;
     const row = element("label");
     const [name, hint = ""] = ARGUMENTS[slot.name] ?? [readable(slot.name), ARGUMENTS[slot.of]?.[1]];
-    const unit = unitOf(slot, timeUnit);
+    const [unit, scale, digits] = unitOf(slot, timeUnit);
     row.title = [`${slot.name}: ${hint || name.toLowerCase()}`, unit && `in ${unitName(unit)}`].filter(Boolean).join(", ");
     row.append(element("span", { textContent: name }));
     if (!slot.span) {
@@ -109,9 +114,10 @@ class Inspector {
     const input = element(words ? "select" : "input");
     if (words) input.append(...[...new Set([...words, slot.value])].map((word) => new Option(String(word))));
     else Object.assign(input, isWord ? { type: "text" } : { type: "number", step: stepOf(slot) });
-    input.value = slot.value;
     input.dataset.slot = slot.name;
-    const value = () => (isWord ? input.value : input.valueAsNumber);
+    input.dataset.scale = scale;
+    input.value = shownAs(slot.value, scale);
+    const value = () => (isWord ? input.value : Number((input.valueAsNumber / scale).toFixed(digits)));
     const send = (isCommitted) => {
       clearTimeout(this.resting);
       if (isWord || Number.isFinite(value())) this.studio.set(this.bar, slot.name, value(), isCommitted);
@@ -148,9 +154,13 @@ function shapeOf(bar) {
   return JSON.stringify([bar.name, bar.site[0], bar.number, bar.runs, bar.slots.map(({ name, span }) => [name, Boolean(span)])]);
 }
 
-function stepOf({ name, is_angle: isAngle }) {
-  if (isAngle) return 1;
-  return LENGTHS.includes(name) ? 0.005 : 0.05;
+function stepOf(slot) {
+  return { "°": 1, cm: 0.5 }[unitOf(slot, "s")[0]] ?? 0.05;
+}
+
+// A number of the file in the unit of its field.
+function shownAs(value, scale) {
+  return typeof value === "number" ? Number((value * scale).toPrecision(6)) : value;
 }
 
 // What an argument is at first when it is added; angles in degrees.

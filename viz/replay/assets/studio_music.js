@@ -11,9 +11,10 @@ class Music {
   /** @type {number[]} */ taps;
   /** @type {number} */ metre;
   /** @type {number} */ downbeat;
+  /** @type {boolean} */ isSharp;
 
   constructor(studio) {
-    Object.assign(this, { studio, beats: [], song: null, taps: [], metre: 4, downbeat: 0 });
+    Object.assign(this, { studio, beats: [], song: null, taps: [], metre: 4, downbeat: 0, isSharp: false });
     this.box = element("div", { id: "music", className: "lane", hidden: true });
     this.canvas = element("canvas");
     this.box.append(element("span", { textContent: "Music", title: "The song, its beats, and longer lines where a bar begins" }), this.canvas);
@@ -23,16 +24,24 @@ class Music {
     this.list.addEventListener("change", () => this.choose(this.list.value));
     this.tapper = element("button", { textContent: "Tap", title: "Tap the tempo, four times or more (T)" });
     this.tapper.addEventListener("click", () => this.tap());
-    this.later = element("button", { textContent: "Bar +1", title: "Bars begin one beat later", hidden: true });
-    this.later.addEventListener("click", () => {
-      this.downbeat = (this.downbeat + 1) % this.metre;
+    this.first = element("select", { title: "On which beat the first whole bar begins, with a longer line. It is taken from the song's accents; where it is wrong, as behind a pick-up, choose it here" });
+    this.first.setAttribute("aria-label", "Bars begin on");
+    this.first.addEventListener("change", () => {
+      this.downbeat = Number(this.first.value);
       this.draw();
+    });
+    this.accent = element("button", { textContent: "Accent", title: "What you end on a beat gets the ease with which it is seen there: ease=\"cubic\" for the trunk, \"in\" for a foot that is put down" });
+    this.accent.setAttribute("aria-pressed", "false");
+    this.accent.addEventListener("click", () => {
+      this.isSharp = !this.isSharp;
+      this.accent.classList.toggle("on", this.isSharp);
+      this.accent.setAttribute("aria-pressed", String(this.isSharp));
     });
     this.tempo = element("output", { id: "tempo" });
     this.buttons = element("div", { className: "buttons" });
     this.buttons.setAttribute("role", "group");
     this.buttons.setAttribute("aria-label", "Music and tempo");
-    this.buttons.append(this.list, this.tapper, this.later, this.tempo);
+    this.buttons.append(this.list, this.tapper, this.first, this.accent, this.tempo);
     studio.view.listen(this.box, LANE_LEFT, LANE_RIGHT);
     new ResizeObserver(() => this.draw()).observe(this.box);
     this.box.addEventListener("pointerdown", (event) => {
@@ -94,7 +103,9 @@ class Music {
 
   tellTempo(tempo) {
     this.tempo.textContent = tempo ? `${Math.round(tempo)} beats/min` : "";
-    this.tempo.title = this.song ? `${this.metre} beats in a bar` : "";
+    const beats = Array.from({ length: this.metre }, (_, k) => new Option(`Bars of ${this.metre}, from beat ${k + 1}`, String(k)));
+    this.first.replaceChildren(...beats);
+    this.first.value = String(this.downbeat);
   }
 
   // A file that states its tempo may take the tapped one.
@@ -110,7 +121,8 @@ class Music {
 
   draw() {
     const { view } = this.studio;
-    this.box.hidden = this.later.hidden = !this.song && !this.beats.length;
+    this.box.hidden = this.first.hidden = !this.song && !this.beats.length;
+    this.accent.hidden = this.studio.beats.length < 2;
     if (this.box.hidden) {
       this.grid.remove();
       return;

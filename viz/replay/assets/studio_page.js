@@ -72,7 +72,10 @@ class Studio {
 
   // As the player's charts.
   show(t) {
-    if (this.player.isPlaying) this.view.follow(t);
+    if (this.player.isPlaying) {
+      this.view.follow(t);
+      this.coarse.use(true);
+    }
     this.tracks.show(t);
     this.hands.show(t);
     this.onion.show(t);
@@ -230,7 +233,7 @@ class Studio {
     const isPair = title === LIFT_AND_DOWN; // the first of it is what is pulled
     this.made = { count: isPair ? 2 : 1, isLast: true, isFirst: isPair };
     this.doing.asked = title;
-    this.send(site ? { op: "insert", site, title, values } : { op: "begin", title }, true);
+    return this.send(site ? { op: "insert", site, title, values } : { op: "begin", title }, true);
   }
 
   // A motion of the library; the robot must be at home there.
@@ -298,7 +301,7 @@ class Studio {
     if (Math.abs(exact - was) < (beat === undefined ? nudge / 2 : 1e-6)) return { [lengthOf(bar).name]: was }; // back again
     const isOff = this.timeUnit === "s" && beat !== undefined; // the song's beats fit no step
     const value = Math.max(isOff ? Math.round(1000 * exact) / 1000 : rounded(exact, nudge), nudge);
-    const isAccent = beat !== undefined && bar.name in ACCENTS && bar.more.includes("ease");
+    const isAccent = this.music.isSharp && beat !== undefined && bar.name in ACCENTS && bar.more.includes("ease");
     return { [lengthOf(bar).name]: value, ...(isAccent ? { ease: ACCENTS[bar.name] } : {}) };
   }
 
@@ -324,7 +327,7 @@ class Studio {
       this.took = performance.now() - asked; // ms, for scripts that measure
     }
     this.tell(this.doing.worded(order, answer.error) ?? (isCommitted ? "saved" : "not saved yet"), Boolean(answer.error));
-    if (answer.error) this.inspector.forget();
+    if (answer.error) this.doing.refused(order, answer.error);
     const isSame = String([...this.chosen]) === chosen; // else another bar has been chosen meanwhile
     if (answer.error || isCommitted) await this.reload(isSame ? answer.site : null);
     if (answer.site && !order.op.startsWith("set") && this.selected !== null && this.chosen.size === 1) this.select(this.selected);
@@ -370,6 +373,7 @@ class Studio {
     const bars = draft.bars.map((bar, index) => ({ ...this.editor.bars[index], ...bar }));
     this.tracks.use(this.player.data, { ...this.editor, bars });
     this.hands.use(bars[this.selected]);
+    this.inspector.entitle(bars[this.selected]);
   }
 
   // The motion that is saved, as MuJoCo plays it; the next edit shows the plan again.
@@ -384,19 +388,8 @@ class Studio {
     this.player.play(true);
   }
 
-  // Changes of all of it as buttons; then the nearest motion, which takes longer, beside one's own.
-  async mend() {
-    if (this.player.data.header.verdict?.ok) return this.tell("the robot can do it");
-    const { base } = this.editor;
-    const { changes } = await this.ask("mend", "looking for changes…");
-    if (!changes || this.editor.base !== base || this.isBusy) return null;
-    this.tools.offer(changes.map(([call, meaning], which) => ({
-      text: meaning, hint: `appends ${call}`, act: () => this.send({ op: "change", which }, true),
-      peek: () => this.nearest.peek(which, meaning), unpeek: () => this.nearest.unpeek(),
-    })));
-    const found = changes.length ? "one click, and the robot can do it" : "no change of tempo, size or height is enough";
-    this.tell(`${found}; looking for the nearest motion, too…`);
-    return this.nearest.look();
+  mend() {
+    return this.nearest.mend();
   }
 
   async export(kind) {
@@ -409,7 +402,7 @@ class Studio {
     const link = element("a", { textContent: answer.file, href: `files/${encodeURIComponent(answer.file)}${location.search}`, target: "_blank" });
     const [before, after] = answer.told.split(answer.file);
     this.tell(before);
-    this.tools.say.append(link, after);
+    this.tools.say.append(link, ` in ${answer.folder}`, after);
     if (answer.then) this.tools.say.append("; next: ", element("code", { textContent: answer.then }));
   }
 

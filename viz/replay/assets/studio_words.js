@@ -128,21 +128,24 @@ function placeOf({ file, line }) {
   return `${file.split(/[\\/]/).pop()}, line ${line}`;
 }
 
+// The unit that a number is shown in, of it how much one of the file's is (m, rad, or degrees in deg()),
+// and to how many decimals it is written there.
 /**
  * @param {Slot} slot
  * @param {string} timeUnit
+ * @returns {[string, number, number]}
  */
 function unitOf({ name, of, is_angle: isAngle }, timeUnit) {
   const names = [name, of, name.split(".").pop()]; // points[0].z is a z
   const isOne = (list) => names.some((one) => list.includes(one));
-  if (isAngle) return "°";
-  if (isOne(LENGTHS)) return "m";
-  if (isOne(TIMES)) return timeUnit;
-  return isOne(ANGLE_NAMES) ? "rad" : "";
+  if (isAngle) return ["°", 1, 6];
+  if (isOne(LENGTHS)) return ["cm", 100, 6];
+  if (isOne(TIMES)) return [timeUnit, 1, 6];
+  return isOne(ANGLE_NAMES) ? ["°", 180 / Math.PI, 4] : ["", 1, 6];
 }
 
 function unitName(unit) {
-  return { "°": "degrees", m: "metres", s: "seconds", rad: "radians", beats: "beats" }[unit] ?? unit;
+  return { "°": "degrees", cm: "centimetres", s: "seconds" }[unit] ?? unit;
 }
 
 // How a call ends that is seen or heard on its beat: at rest a foot lands early, a trunk turns back late.
