@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 from difflib import SequenceMatcher
+from functools import partial
 from math import degrees
 from typing import TYPE_CHECKING
 
@@ -42,7 +43,9 @@ _STATES = {
     "not raised": "not up there: raise it before",
     "raised: put it down() before": "still up there: put it down before",
 }
-_MEASURE = re.compile(r"(-?[\d.]+(?:e-?\d+)?) (m|rad), limit (-?[\d.]+(?:e-?\d+)?)")
+_MEASURE = re.compile(r"(-?[\d.]+(?:e-?\d+)?) (m, rad|m|rad), limit (-?[\d.]+(?:e-?\d+)?)")
+MIXED = "m, rad"  #: Unit of checks of places and angles
+_TURNS = ("attitude", "turning", "joints")  # words of their subjects that are angles
 _SHOWN = {"m": (100.0, " cm"), "rad": (degrees(1.0), "\N{DEGREE SIGN}")}
 
 
@@ -115,19 +118,24 @@ def _words(one: Annotation) -> str:
         return LOOKED_FOR if one.text == LOOKED_FOR else NO_WAY
     if one.limit == ENDS and one.subject.startswith(LAST) and "home()" in one.text:
         return NOT_HOME
-    return _MEASURE.sub(_as_read, one.text)
+    return _MEASURE.sub(partial(_as_read, one.subject), one.text)
 
 
 def _as_drawn(curve: MarginCurve) -> MarginCurve:
-    scale, unit = _SHOWN.get(curve.unit, (1.0, curve.unit))
-    if scale == 1.0:
+    if curve.unit == MIXED:
+        return replace(curve, unit="m or rad")
+    if curve.unit not in _SHOWN:
         return curve
+    scale, unit = _SHOWN[curve.unit]
     tight = scale * curve.tight
     return replace(curve, unit=unit.strip(), margin=scale * curve.margin, tight=tight)
 
 
-def _as_read(match: re.Match[str]) -> str:
-    """A value and its limit in cm or degrees."""
-    scale, unit = _SHOWN[match[2]]
+def _as_read(subject: str, match: re.Match[str]) -> str:
+    """A value and its limit in cm or degrees: of a check of both, what the subject has."""
+    kind = match[2]
+    if kind == MIXED:
+        kind = "rad" if any(word in subject for word in _TURNS) else "m"
+    scale, unit = _SHOWN[kind]
     value, limit = (f"{scale * float(number):.3g}" for number in (match[1], match[3]))
     return f"{value}{unit}, limit {limit}{unit}"

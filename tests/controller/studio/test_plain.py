@@ -63,23 +63,29 @@ def test_limits_are_told_in_centimetres_and_degrees() -> None:
         "31 N m, limit 23.7": "31 N m, limit 23.7",
     }
     found = [Annotation("joint position", "FR_thigh", 0.0, text, True, (), ()) for text in texts]
+    both = "0.2 m, rad, limit 0.1"
+    found += [
+        Annotation("lag", name, 0.0, both, True, (), ()) for name in ("trunk", "trunk turning")
+    ]
     end = "0.175 m, rad, limit 0.05 (it is to end in stand: home())"
     found.append(Annotation("entry and exit", "exit attitude", 1.0, end, True, (), ()))
     time, worst = np.zeros(1), np.zeros(1, dtype=int)
     curves = tuple(
         MarginCurve(unit, unit, time, np.ones(1), ("one",), worst, 0.1)
-        for unit in ("m", "rad", "N m")
+        for unit in ("m", "rad", "N m", "m, rad")
     )
     verdict = Verdict(False, "4 limits broken", tuple(found), curves)
     recording = synthetic_recording(script=(("stand", 0.4),))
     content = plainly(ReplayContent(recording, verdict=verdict)).verdict
     assert content is not None
     *told, last = [one.text for one in content.annotations]
-    assert told == list(texts.values())
+    mixed = ["20 cm, limit 10 cm", "11.5\N{DEGREE SIGN}, limit 5.73\N{DEGREE SIGN}"]
+    assert told == [*texts.values(), *mixed]
     assert last.endswith("All home at the end does that")
     drawn = [(one.unit, float(one.margin[0]), one.tight) for one in content.curves]
     assert drawn == [
         ("cm", 100.0, 10.0),
         ("\N{DEGREE SIGN}", pytest.approx(57.2958, abs=1e-4), pytest.approx(5.72958, abs=1e-5)),
         ("N m", 1.0, 0.1),
+        ("m or rad", 1.0, 0.1),
     ]
