@@ -53,23 +53,23 @@ class Nearest {
     this.peeked = [];
   }
 
-  // What is missing at the end and changes of all of it, as buttons; then the nearest motion, which
-  // takes longer, beside one's own.
+  // What is missing at the end; changes of all of it as buttons; then the nearest motion, which takes
+  // longer, beside one's own.
   async mend() {
     const { studio } = this;
     const { editor: { base }, player } = studio;
     if (player.data.header.verdict?.ok) return studio.tell("the robot can do it");
-    const home = studio.doing.missing(player.data.annotations);
+    const home = studio.doing.missing(player.data.annotations); // which has its button beside the reason
     if (home.length && player.data.annotations.filter((one) => one.is_broken).length === 1) {
-      studio.tools.offer(home);
+      /** @type {HTMLElement} */ (studio.doing.why.lastChild).focus();
       return studio.tell("only its way home is missing: one click adds that");
     }
     const { changes } = await studio.ask("mend", "looking for changes…");
     if (!changes || studio.editor.base !== base || studio.isBusy) return null;
-    studio.tools.offer([...home, ...changes.map(([call, meaning], which) => ({
+    studio.tools.offer(changes.map(([call, meaning], which) => ({
       text: meaning, hint: `appends ${call}`, act: () => studio.send({ op: "change", which }, true),
       peek: () => this.peek(which, meaning), unpeek: () => this.unpeek(),
-    }))]);
+    })));
     const found = home.length ? "it does not end at home: add that first"
       : changes.length ? "one click, and the robot can do it" : "no change of tempo, size or height is enough";
     studio.tell(`${found}; looking for the nearest motion, too…`);
