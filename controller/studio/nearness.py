@@ -108,4 +108,6 @@ def distance(found: Sequence[Departure]) -> str:
     angle = f"{np.degrees(turned.angle):.1f}° (trunk at {turned.angle_time:.2f} s)"
     lag = f"{abs(late):.3f} s {'late' if late > 0.0 else 'early'}" if late else "in time"
     where = " and from ".join(parts)
+    foot = max(found, key=lambda one: one.foot_place).farther_foot
+    place = f"{foot}, {place}" if foot else place
     return f"at most {place} and {angle} from yours, and {lag}; it differs from {where}"

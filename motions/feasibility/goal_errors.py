@@ -28,6 +28,8 @@ class Misses:
     times: Float[np.ndarray, " k"]  #: (k,) after the start of the span [s]
     away: Float[np.ndarray, "k 5"]  #: (k, 5) distances [m]
     turned: Float[np.ndarray, "k 5"]  #: (k, 5) angles [rad], of the trunk only
+    feet: Float[np.ndarray, "k 4"]
+    """(k, 4) distances [m] of the feet, in the air too; of what was written as a whole only."""
 
 
 def misses_of(span: DynamicSpan, places: _Places, model: RobotModel) -> Misses:
@@ -56,7 +58,7 @@ def _of_phases(span: DynamicSpan, asked: PhaseProblem, places: _Places) -> Misse
             p = plan.q[0, :3] + R @ np.array(phase.body[:3])
             away[row, 0] = np.linalg.norm(plan.q[knot, :3] - p)
             turned[row, 0] = np.abs(angles[knot] - angles[0] - phase.body[3:]).max()
-    return Misses(ends, away, turned)
+    return Misses(ends, away, turned, away[:, 1:])
 
 
 def _of_written(span: DynamicSpan, places: _Places, model: RobotModel) -> Misses:
@@ -67,11 +69,12 @@ def _of_written(span: DynamicSpan, places: _Places, model: RobotModel) -> Misses
     away[:, 0] = np.linalg.norm(plan.q[:, :3] - wanted[:, :3], axis=1)
     asked, done = (Rotation.from_quat(q[:, 3:7]) for q in (wanted, plan.q))
     turned[:, 0] = (asked.inv() * done).magnitude()
-    feet = feet_at(wanted, np.zeros((len(wanted), 18)), model)[0]
+    asked_feet = feet_at(wanted, np.zeros((len(wanted), 18)), model)[0]
+    feet = np.linalg.norm(places - asked_feet, axis=2)
     lands = plan.stance[1:] & ~plan.stance[:-1]
     for row, leg in np.argwhere(lands) + [1, 0]:
-        away[row, 1 + leg] = np.linalg.norm(places[row, leg] - feet[row, leg])
-    return Misses(plan.times, away, turned)
+        away[row, 1 + leg] = feet[row, leg]
+    return Misses(plan.times, away, turned, feet)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +88,8 @@ class Departure:
         place_time: when [s].
         angle, angle_time: greatest angle [rad] of the trunk from what was written, and when [s].
         lag: how late [s] the trunk is as a whole; below 0, early.
+        foot_place: greatest distance [m] of a foot from what was written, in the air too.
+        foot, foot_time: of which foot, and when [s].
     """
 
     start: float
@@ -95,15 +100,26 @@ class Departure:
     angle: float
     angle_time: float
     lag: float
+    foot_place: float
+    foot: str
+    foot_time: float
+
+    @property
+    def farther_foot(self) -> str:
+        """The foot that is farther from what was written than ``subject``, in words; else ""."""
+        if self.foot_place <= self.place:
+            return ""
+        return f"{1e3 * self.foot_place:.0f} mm ({self.foot} at {self.foot_time:.2f} s)"
 
     def __str__(self) -> str:
-        """Two lines for a person, at most 80 columns wide."""
+        """Two lines for a person or three, at most 80 columns wide."""
         late = "late" if self.lag >= 0.0 else "early"
         return (
             f"{self.start:.2f} to {self.end:.2f} s is the nearest to what was written: "
             f"{1e3 * self.place:.0f} mm off\n"
             f"({self.subject} at {self.place_time:.2f} s), {np.degrees(self.angle):.1f} deg "
             f"(at {self.angle_time:.2f} s), {1e3 * abs(self.lag):.0f} ms {late}."
+            + (f"\nIn the air it is {self.farther_foot} off." if self.farther_foot else "")
         )
 
 
@@ -118,6 +134,7 @@ def departures(plan: MotionPlan, model: RobotModel) -> tuple[Departure, ...]:
         away, turned = np.nan_to_num(misses.away), np.nan_to_num(misses.turned[:, 0])
         row, column = np.unravel_index(int(np.argmax(away)), away.shape)
         worst = int(np.argmax(turned))
+        far, leg = np.unravel_index(int(np.argmax(misses.feet)), misses.feet.shape)
         found.append(
             Departure(
                 start=span.start,
@@ -128,6 +145,9 @@ def departures(plan: MotionPlan, model: RobotModel) -> tuple[Departure, ...]:
                 angle=float(turned[worst]),
                 angle_time=span.start + float(misses.times[worst]),
                 lag=solved.lag,
+                foot_place=float(misses.feet[far, leg]),
+                foot=FOOT_NAMES[leg],
+                foot_time=span.start + float(misses.times[far]),
             )
         )
     return tuple(found)
@@ -140,10 +160,13 @@ def departure_measurements(plan: MotionPlan, model: RobotModel) -> dict[str, flo
         return {}
     farthest = max(found, key=lambda one: one.place)
     most_turned = max(found, key=lambda one: one.angle)
+    foot = max(found, key=lambda one: one.foot_place)
     return {
         "plan off what was written [m]": farthest.place,
         "the same, at [s]": farthest.place_time,
         "plan turned off what was written [deg]": float(np.degrees(most_turned.angle)),
         "the same turn, at [s]": most_turned.angle_time,
+        f"plan's {foot.foot} off what was written [m]": foot.foot_place,
+        "the same foot, at [s]": foot.foot_time,
         "plan late [s]": max((one.lag for one in found), key=abs),
     }

@@ -45,6 +45,7 @@ from motions.plan.compiled_plan import (
     event_at,
     placed,
 )
+from motions.plan.leg_tasks import tasks_of
 from motions.plan.parts import DECIMALS, rests
 from motions.plan.quasi_static import UNLOAD_TIME, FootContacts, compile_quasi_static
 from motions.plan.trajectory import Trajectory, trajectory_of
@@ -408,11 +409,8 @@ class _Maker:
     ) -> None:
         """A part that ends at rest at ``end`` (see ``CompiledPlan.curves``)."""
         span = DynamicSpan(start, frame, asked, placed(found, frame), self._timeline.tolerance)
-        curves, stance = curves_of(span.trajectory, self._model, end), found.stance
-        changes = np.flatnonzero(np.any(stance[1:] != stance[:-1], axis=1)) + 1
-        rows = np.concatenate([[0], changes])
-        times = found.times[rows]
-        self._parts.append(_Part(start, curves, times, stance[rows], ~stance[rows]))
+        curves = curves_of(span.trajectory, self._model, end)
+        self._parts.append(_Part(start, curves, *tasks_of(found, self._model)))
         self._spans.append(span)
 
     def joined(self) -> CompiledPlan:

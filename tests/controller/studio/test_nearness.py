@@ -90,11 +90,15 @@ def test_where_no_edit_says_it_the_author_is_told_what_would() -> None:
 
 
 def test_the_distance_is_that_of_the_farthest_part() -> None:
-    near = Departure(0.0, 1.0, 0.010, "trunk", 0.5, 0.1, 0.4, -0.02)
-    far = Departure(2.0, 3.0, 0.025, "FL_foot", 2.5, 0.05, 2.4, 0.01)
+    near = Departure(0.0, 1.0, 0.010, "trunk", 0.5, 0.1, 0.4, -0.02, 0.009, "FR_foot", 0.3)
+    far = Departure(2.0, 3.0, 0.025, "FL_foot", 2.5, 0.05, 2.4, 0.01, 0.025, "FL_foot", 2.5)
     assert distance([near, far]) == (
         "at most 25 mm (FL_foot at 2.50 s) and 5.7° (trunk at 0.40 s) from yours, and "
         "0.020 s early; it differs from 0.00 to 1.00 s and from 2.00 to 3.00 s"
+    )
+    lowered = replace(near, foot_place=0.2)
+    assert distance([lowered, far]).startswith(
+        "at most 200 mm (FR_foot at 0.30 s), 25 mm (FL_foot at 2.50 s) and 5.7° ("
     )
 
 

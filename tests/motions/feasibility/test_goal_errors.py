@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from go2_wbc.errors import PlanNotFound, TimelineError
+from go2_wbc.legs import LEGS, Leg
 from motions import CompiledPlan, FeasibilityChecker, Timeline, deg
 from motions.dynamics.phases import Tolerance
 from tests.solver import needs_solver
@@ -19,6 +20,8 @@ SWAY = (
     .hold(0.2)
 )
 """Faster than friction allows."""
+HIGH = Timeline(physics="nearest", shift_time=0.3).foot("FR", z=0.5, over=0.5).down("FR", over=0.5)
+"""Higher and faster than a paw can go."""
 
 
 def test_as_it_is_written_it_is_refused(checker: FeasibilityChecker) -> None:
@@ -60,6 +63,30 @@ def test_the_table_ends_with_how_far_it_had_to_go_where_and_how_late(
     slow = checker.check(Timeline(physics="nearest").body(y=0.03, over=0.8).home(over=0.8))
     assert not slow.departures
     assert "nearest" not in slow.table()
+
+
+@needs_solver
+def test_a_raised_foot_that_is_lowered_is_told_with_its_distance_and_when(
+    checker: FeasibilityChecker,
+) -> None:
+    """Feet counted where they land only: of a paw 0.2 m too low nothing but the trunk was told."""
+    line = HIGH.home(over=0.8).hold(0.2)
+    (departed,) = checker.check(line).departures
+    plan = checker.plan(line)
+    written = checker.plan(replace(line, physics="as_written"), check=False)
+    assert isinstance(plan, CompiledPlan)
+    assert isinstance(written, CompiledPlan)
+    t = np.linspace(0.0, line.end, 300)
+    feet = [one.curves(t)[:, 18:].reshape(-1, 4, 3) for one in (plan, written)]
+    off = np.linalg.norm(feet[0] - feet[1], axis=2)
+    when, leg = np.unravel_index(int(off.argmax()), off.shape)
+    assert departed.foot == "FR_foot"
+    assert LEGS[leg] is Leg.FR
+    assert departed.foot_place > 2.0 * departed.place
+    assert departed.foot_place == pytest.approx(off.max(), abs=0.01)
+    assert departed.foot_time == pytest.approx(t[when], abs=0.05)
+    last = str(departed).splitlines()[-1]
+    assert re.fullmatch(r"In the air it is \d+ mm \(FR_foot at \d\.\d\d s\) off\.", last)
 
 
 @needs_solver
