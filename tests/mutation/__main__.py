@@ -111,9 +111,16 @@ class Judge:
         sandbox.write(mutant.path, mutant.applied(source))
         outcome = sandbox.test(targets, marker, sorted(excluded | failing), limit, plain=plain)
         sandbox.write(mutant.path, source)
-        name, key = outcome.failed, (outcome.failed, plain)
-        if name.startswith("tests/") and key not in self._passing:
-            self._passing[key] = sandbox.test([name], marker, (), limit, plain=plain).passed
+        if outcome.passed or outcome.is_late:
+            return outcome
+        is_told = outcome.failed.startswith("tests/")  # else something has ended the process
+        asked = [outcome.failed] if is_told else targets
+        key = (" ".join(asked), plain)
+        if key not in self._passing:
+            good = sandbox.test(asked, marker, excluded, limit, plain=plain)
+            self._passing[key] = good.passed or not (is_told or good.failed.startswith("exit"))
+            if not self._passing[key] and not is_told:
+                raise RuntimeError(f"without a mutant the tests do not run either: {good.failed}")
             if not self._passing[key]:  # it fails anyway: try again without it
                 return self._test(mutant, targets, excluded, marker, limit, plain=plain)
         return outcome

@@ -19,6 +19,9 @@ from tests.mutation.__main__ import (
 from tests.mutation.operators import draw, mutants_of
 
 CODE = """
+import os
+
+
 def add(a, b) -> int:
     return a + b
 
@@ -31,14 +34,32 @@ def shrink(a) -> int:
     while a:
         a -= a
     return a
+
+
+def leave(a) -> int:
+    if a > 8:
+        os._exit(0)
+    return a
+
+
+def is_near(a) -> bool:
+    return a < 1
 """
 TEST = """
-from small.sums import add, is_above, shrink
+from small.sums import add, is_above, leave, shrink
 
 def test_sums():
+    assert leave(8) == 8
     assert shrink(2) == 0
     assert add(1, 2) == 3
     assert is_above(2, 1)
+"""
+EXPORT = "from small.sums import is_near as is_near"
+OTHER_TEST = """
+import small
+
+def test_near():
+    assert small.is_near(0) and not small.is_near(1)
 """
 QUIET = """
 def speak(n: Literal[1], size: int = 2) -> str | None:
@@ -56,16 +77,23 @@ def test_a_planted_survivor_is_told_and_a_kill_and_what_never_ends(
     for stage in (NEAR, PLAIN):
         monkeypatch.setitem(LIMITS, stage, 2.0)
     root, out = tmp_path / "root", tmp_path / "out.jsonl"
-    for name, text in (("small/sums.py", CODE), ("tests/small/test_sums.py", TEST)):
+    files = {"small/sums.py": CODE, "small/__init__.py": EXPORT}
+    files |= {"tests/small/test_sums.py": TEST, "tests/small/test_others.py": OTHER_TEST}
+    for name, text in files.items():
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(text)
-    arguments = ["--package", "small", "--n", "9", "--out", str(out)]
+    arguments = ["--package", "small", "--n", "19", "--until", NEAR, "--out", str(out)]
     assert main(arguments, root) == 1
     found = [json.loads(line) for line in out.read_text().splitlines()]
     assert {record["mutant"]: record["stage"] for record in found} == {
         "small/sums.py add: a + b -> (a - b)": NEAR,
         "small/sums.py is_above: a > b -> (a >= b)": ALIVE,
         "small/sums.py shrink: a -= a -> a += a": TIMEOUT,
+        "small/sums.py leave: a > 8 -> (a >= 8)": NEAR,  # it ends the process of the tests
+        "small/sums.py leave: 8 -> (9)": ALIVE,
+        "small/sums.py leave: 0 -> (1)": ALIVE,
+        "small/sums.py is_near: a < 1 -> (a <= 1)": NEAR,  # by what the package exports
+        "small/sums.py is_near: 1 -> (2)": NEAR,
     }
     assert (root / "small/sums.py").read_text() == CODE
     assert main([*arguments, "--resume"], root) == 1
