@@ -8,12 +8,12 @@ from controller.behaviours.standing import Standing
 from controller.behaviours.walking import Walking
 from controller.navigation import DriveStraight, Goal, TurnInPlace
 from go2_wbc.contacts import GAITS
-from go2_wbc.errors import ModeError
+from go2_wbc.errors import DynamicMotionRefused, ModeError, StanceMismatch
 from go2_wbc.planning.command import ZERO_COMMAND
 from go2_wbc.planning.ground import MOST_FRICTION
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
-from motions import compile_timeline, load_motion
+from motions import Timeline, compile_timeline, load_motion
 from tests.controller.plants import MID_RISE, PERIOD, StillPlant, WatchedPlant, is_limp
 
 # --- only what was measured -------------------------------------------------------------------
@@ -128,6 +128,19 @@ def test_a_high_five_whose_robot_does_not_come_to_rest_is_not_standing_in_the_en
         plant.from_time(go2.state.time + plan.duration + 0.5, shake)
         assert go2.play(plan) is False
         assert go2.mode is not Mode.STANDING
+
+
+def test_a_dynamic_motion_is_for_a_robot_only_if_that_is_said(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(StillPlant, "is_hardware", True)
+    line = Timeline(balance=False).foot("FL", z=0.03, over=0.4).foot("RR", z=0.03, over=0.4)
+    with GO2Controller(plant=StillPlant()) as go2:
+        plan = compile_timeline(line.home(over=0.4), go2._pilot._loop.model)
+        with pytest.raises(DynamicMotionRefused):
+            go2._pilot.play(plan)
+        with pytest.raises(StanceMismatch):
+            go2._pilot.play(plan, allow_dynamic=True)
 
 
 def turn_over(plant: WatchedPlant) -> None:

@@ -7,7 +7,8 @@ import pytest
 
 from benchmarks.policies import laid_out
 from controller.policies import TROT, Policy, Sidecar, probe
-from controller.policies.probing import CLEAR, Change, Track, changes, scaled
+from controller.policies.probing import CLEAR, COMMAND, Change, Track, changes, scaled
+from go2_wbc.robot.state import RobotState
 from tests.controller.policies.layouts import ISAAC_LAB, UNITREE
 
 
@@ -54,6 +55,26 @@ def test_with_anything_changed_by_a_factor_of_2_or_more_it_walks_clearly_worse(
         and track.mark(Policy("", change.sidecar, policy.network)) < CLEAR * right
     ]
     assert missed == ["scale of joint_velocities, 0.4 times that"], "half of them do for the clone"
+
+
+def test_a_mark_is_the_sum_of_what_goes_wrong_in_the_last_two_thirds(
+    policy: Policy, track: Track, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[RobotState] = []
+    read = track._plant.read
+    monkeypatch.setattr(track._plant, "read", lambda: seen.append(read()) or seen[-1])
+    mark = track.mark(policy)
+    last = seen[len(seen) // 3 :]
+    v = np.mean([s.v for s in last], axis=0)
+    rise = [s.R_world_base[2] @ s.v[:3] for s in last]
+    rolling = np.linalg.norm([s.v[3:5] for s in last], axis=1)
+    told = sum(
+        np.sqrt(np.mean(np.square(of))) / unit
+        for of, unit in ((rise, 0.1), (rolling, 0.3), ([s.tilt for s in last], 0.05))
+    )
+    asked = policy.sidecar.commands.clip(COMMAND)
+    told += abs(v[0] - asked.linear_x) / 0.1 + abs(v[1] - asked.linear_y) / 0.1
+    assert mark == pytest.approx(told + abs(v[5] - asked.angular_z) / 0.2)
 
 
 @pytest.mark.parametrize("order", [ISAAC_LAB, UNITREE], ids=["isaac-lab", "unitree"])

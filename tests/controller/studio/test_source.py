@@ -81,6 +81,13 @@ def test_a_number_is_replaced_where_it_stands() -> None:
     assert new.strip() == b".home(over=2)"
 
 
+def test_a_number_of_a_dictionary_is_replaced_in_it() -> None:
+    text = FILE.replace(b"DEEP, HIGH = -0.03, 0.08  # m", b"Z = {'high': 0.08, 'deep': -0.03}")
+    text = text.replace(b"z=DEEP", b"z=Z['deep']").replace(b"z=HIGH", b"z=Z['high']")
+    ((_, new),) = _changed(text, Source(text).set(_site(text, "body"), "z", -0.045).data)
+    assert new == b"Z = {'high': 0.08, 'deep': -0.045}\n"
+
+
 def test_slots_tell_values_units_and_places() -> None:
     source = Source(FILE)
     pitch, z, over = source.slots(_site(FILE, "body"))

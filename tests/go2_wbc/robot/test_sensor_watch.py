@@ -315,6 +315,7 @@ def test_what_legs_push_by_is_felt_and_an_error_is_what_they_lack(
         m.push[:], m.lack[0] = (0.8, 0.0, 9.81), lack
         plain(judge_accelerometer)(m, (1.0, 0.0, 9.81), ZERO, ZERO, UP, 9.81, True, DT)
     assert m.force_is_off == is_off
+    assert m.force_time == 0.0  # what is taken off, or felt, lasts no longer
 
 
 @pytest.mark.parametrize(("lasts", "parts"), [(0.2, []), (0.6, ["accelerometer"])])
