@@ -17,9 +17,11 @@ from go2_wbc.planning.sight import (
     RISE,
     SPEED,
     STOP,
+    Sight,
+    steps_by_sight,
     way_ahead,
 )
-from go2_wbc.planning.sighted_steps import NEAR, OVER, choose
+from go2_wbc.planning.sighted_steps import NEAR, OVER, choose, swing_by_sight
 from go2_wbc.plant.terrain import DOWN, Blocks, Gap, Ramp, Slope, Stairs, Stones, Terrain
 from go2_wbc.reference import SWING
 from go2_wbc.robot.model import RobotModel
@@ -208,6 +210,32 @@ def test_the_calf_has_room_behind_the_foot_whichever_way_the_robot_walks(speed: 
         0, MODEL.snapshot(state_of(q)), state, walking._walk, heights, (0.0, 0.25), blind, math.inf
     )
     assert step.chosen[0] > blind[0] + 0.02
+
+
+def test_a_swing_by_sight_has_the_speed_and_acceleration_of_its_places() -> None:
+    heights, blind = exact_map(None), np.array([0.3, -0.1, FOOT])
+    walking, now, h = planner(heights), standing(), 1e-6
+    foot = walking._state.feet[1]
+    foot.swing.start[:], foot.step.goal[:], foot.step.chosen[:] = (0.1, -0.15, 0.05), blind, blind
+    foot.step.is_sighted, foot.step.next = True, math.inf
+    foot.step.begin, foot.step.end, foot.step.peak, foot.step.top = 0.2, 0.85, 0.45, 0.15
+
+    def moved(elapsed: float) -> np.ndarray:
+        rows, spans = np.zeros((3, 3)), (elapsed, 0.4 - elapsed)
+        swing_by_sight(1, now, walking._state, walking._walk, heights, spans, blind, 0.0, *rows)
+        return rows
+
+    for elapsed in np.arange(0.015, 0.4, 0.03):  # at 0.08, 0.18 and 0.34 the acceleration jumps
+        change = (moved(elapsed + h) - moved(elapsed - h)) / (2.0 * h)
+        np.testing.assert_allclose(moved(elapsed)[1:], change[:2], atol=1e-4)
+    assert moved(0.0)[0] == pytest.approx(foot.swing.start)
+    assert moved(0.4)[0] == pytest.approx([0.3, -0.1, FOOT - CONFIG.swing.touchdown_depth])
+
+
+@pytest.mark.parametrize("sees", [False, True])
+@pytest.mark.parametrize("uneven_way", [0.0, 0.5])
+def test_feet_are_placed_by_a_map_of_uneven_ground_only(sees: bool, uneven_way: float) -> None:
+    assert steps_by_sight(Sight(sees=sees, uneven_way=uneven_way)) == (sees and uneven_way > 0.0)
 
 
 def test_a_trunk_that_sways_drags_no_foot_over_an_edge() -> None:
