@@ -131,3 +131,11 @@ def checker(model: "RobotModel") -> "FeasibilityChecker":
     from motions import FeasibilityChecker
 
     return FeasibilityChecker(model)
+
+
+@pytest.fixture(scope="module")
+def file(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A new file with the name and text that are the ``FILE`` of the module."""
+    path = tmp_path_factory.mktemp("studio") / request.module.FILE[0]
+    path.write_text(request.module.FILE[1], encoding="utf-8")
+    return path

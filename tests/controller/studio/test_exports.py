@@ -36,13 +36,7 @@ def lean() -> Timeline:
     """Lean too far."""
     return Timeline().body(y=0.2, over=0.5).home(over=0.5)
 '''
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("exports") / "my moves.py"
-    path.write_text(MOVES, encoding="utf-8")
-    return path
+FILE = "my moves.py", MOVES
 
 
 @pytest.fixture(scope="module")

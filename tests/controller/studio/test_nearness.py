@@ -102,11 +102,7 @@ def test_the_distance_is_that_of_the_farthest_part() -> None:
     )
 
 
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("studio") / "sway.py"
-    path.write_text(SWAY, encoding="utf-8")
-    return path
+FILE = "sway.py", SWAY
 
 
 @pytest.fixture(scope="module")

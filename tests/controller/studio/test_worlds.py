@@ -36,13 +36,7 @@ ICE: dict[str, object] = {"friction": 0.2, "payload": 3.0, "sensors": "imu"}
 CLOSE = 1e-6  #: Of a chance: what is kept is kept by numbers that are rounded to 1e-7
 SLOPE_ERROR = 0.02  #: Of a rise: feet press into the ground, and the trunk's attitude is felt
 FORCE_ERROR = 2.0  #: N, of what the feet bear, on average over a motion that ends as it began
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("studio") / "turn.py"
-    path.write_text(TURN, encoding="utf-8")
-    return path
+FILE = "turn.py", TURN
 
 
 @pytest.fixture(scope="module")

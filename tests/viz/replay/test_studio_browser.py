@@ -20,13 +20,7 @@ TRIANGLES = """(() => {
 })()"""
 """Of the robot in the 3D view."""
 SAID = "document.getElementById('studio-say').textContent"
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("studio") / "greet.py"
-    path.write_text(GREET, encoding="utf-8")
-    return path
+FILE = "greet.py", GREET
 
 
 @pytest.fixture(scope="module")

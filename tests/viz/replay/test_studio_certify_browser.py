@@ -17,15 +17,14 @@ pytestmark = pytest.mark.slow
 DOING = "document.getElementById('studio-doing')"
 RUNS = 3
 ROWS = "#certified tbody tr"
+FILE = "nod.py", NOD
 
 
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    path = tmp_path_factory.mktemp("studio") / "nod.py"
-    path.write_text(NOD, encoding="utf-8")
+@pytest.fixture(scope="module", autouse=True)
+def _one_process() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(run, "processors", lambda: 1)  # another worker starts longer than it runs
-        yield path
+        yield
 
 
 def _hear(tab: Tab, act: str) -> None:

@@ -31,13 +31,7 @@ def feet() -> Timeline:
     line = line.body(z=-0.02, over=0.5).home(over=0.5).turn(deg(20.0))
     return line.then(find_motion("nod")()).foot("FR", z=0.08, over=0.5)
 '''
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("studio") / "feet.py"
-    path.write_text(FEET, encoding="utf-8")
-    return path
+FILE = "feet.py", FEET
 
 
 def _index(tab: Tab, name: str) -> int:

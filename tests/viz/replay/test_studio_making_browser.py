@@ -35,13 +35,7 @@ def look() -> Timeline:
     """Look aside."""
     return Timeline().body(yaw=deg(12.0), over=0.6).home(over=0.6)
 '''
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("studio") / "acts.py"
-    path.write_text(ACTS, encoding="utf-8")
-    return path
+FILE = "acts.py", ACTS
 
 
 def test_a_move_is_split_at_the_playhead_by_key_and_button(tab: Tab, file: Path) -> None:

@@ -34,13 +34,7 @@ RED = """[replay.scene.body, replay.scene.ghost.body].map(({ root }) => {
   return count > 0;
 })"""
 """Whether parts of the robot, and of its ghost, are red."""
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("studio") / "sway.py"
-    path.write_text(SWAY, encoding="utf-8")
-    return path
+FILE = "sway.py", SWAY
 
 
 def _propose(tab: Tab) -> None:

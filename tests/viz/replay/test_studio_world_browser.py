@@ -12,13 +12,7 @@ from tests.viz.replay.studio_tab import do
 
 pytestmark = pytest.mark.slow
 SAID = "document.getElementById('studio-say').textContent"
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("studio") / "turn.py"
-    path.write_text(TURN, encoding="utf-8")
-    return path
+FILE = "turn.py", TURN
 
 
 def test_a_world_is_chosen_with_keys_and_stays_as_the_page_is_loaded_again(
