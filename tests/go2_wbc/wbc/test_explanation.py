@@ -28,7 +28,7 @@ from go2_wbc.wbc.limit_rows import places_of
 from go2_wbc.wbc.problem import SIZE, Problem, Rows
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 from go2_wbc.wbc.tasks import Task
-from tests.engine_helpers import standing
+from tests.engine_helpers import JO, ST, SW, standing
 from tests.go2_wbc.wbc.situations import (
     JOINT_WORDS,
     KINDS,
@@ -397,3 +397,12 @@ def test_a_task_of_a_users_own_is_named_by_its_name() -> None:
     labels = task_labels(wbc.formulate(*standing(MODEL)))
     assert labels[-2:] == [("steady 1", "rad/s^2"), ("steady 2", "rad/s^2")]
     assert ("trunk height", "m/s^2") in labels
+
+
+def test_the_joints_of_a_leg_that_is_raised_have_rows_and_its_foot_has_none() -> None:
+    labels = task_labels(WholeBodyController(MODEL).formulate(*standing(MODEL, (ST, ST, SW, JO))))
+    names = [name for name, _ in labels]
+    assert [name for name in JOINT_WORDS if name in names] == list(JOINT_WORDS[9:])
+    assert [name for name in names if "foot" in name] == [f"RL foot {axis}" for axis in "xyz"]
+    forces = [name for name in names if "force" in name]
+    assert forces == [f"{leg} force {axis}" for leg in ("FL", "FR") for axis in "xyz"]
