@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from go2_wbc.errors import ConfigError
 from go2_wbc.plant.terrain import (
     BOTH,
     DOWN,
@@ -33,7 +34,7 @@ def steps(*ends: float) -> Callable[[float], float]:
 
 
 def lines(*points: tuple[float, float]) -> Callable[[float], float]:
-    return lambda x: float(np.interp(x, *zip(*points, strict=True)))
+    return lambda x: float(np.interp(x, *np.transpose(points)))
 
 
 WAVES = [0.04 * (1.0 - math.cos(2.0 * math.pi * n / 16)) for n in range(17)]
@@ -75,12 +76,13 @@ STONES = [(0.8 + 0.1 + 0.35 * n, 0.8 + 0.35 * (n + 1)) for n in range(6)]
 def test_the_ground_is_as_high_as_is_said_and_ends_where_it_does(
     terrain: Terrain, height: Callable[[float], float], end: float
 ) -> None:
-    x = np.linspace(0.21, 2.47, 229)
+    x = np.linspace(-1.03, 2.47, 353)
     around = [np.array([height(a) for a in x + off]) for off in (-NEAR_EDGE, 0.0, NEAR_EDGE)]
     is_edge = np.ptp(around, axis=0) > 5 * NEAR_EDGE
-    found = true_heights(terrain, np.column_stack([x, np.full(len(x), 0.01)]))
     assert is_edge.mean() < 0.1
-    assert found[~is_edge] == pytest.approx(around[1][~is_edge], abs=1e-4)
+    for y in (0.01, 0.3 if isinstance(terrain, Stones) else 2.0):
+        found = true_heights(terrain, np.column_stack([x, np.full(len(x), y)]))
+        assert found[~is_edge] == pytest.approx(around[1][~is_edge], abs=1e-9)
     assert terrain.end == pytest.approx(end)
 
 
@@ -90,6 +92,7 @@ def test_stones_lie_in_rows_and_may_be_lower_and_open_stairs_have_nothing_below(
         0.35 * np.arange(-3, 4)
     )
     assert len(level) == 6 * 7
+    assert Stones(uneven=0.1, seed=6).blocks() != Stones(uneven=0.1, seed=5).blocks()
     tops = [one.centre[2] + one.half_size[2] for one in Stones(uneven=0.1).blocks()]
     assert -0.1 < min(tops) < -0.08
     assert -0.02 < max(tops) < 0.0
@@ -116,12 +119,15 @@ def test_boxes_are_strewn_evenly_but_for_where_the_robot_starts() -> None:
 
 
 def test_a_drawn_course_is_long_enough_and_no_higher_and_steeper_than_is_said() -> None:
+    assert Course.drawn(3) != Course.drawn(4)
+    with pytest.raises(ConfigError, match="end"):
+        Course((Stairs(),))
     kinds = set[type[Terrain]]()
     for seed in range(20):
         course = Course.drawn(seed)
         kinds |= {*map(type, course.parts)}
         assert course.end >= 12.0 > course.end - course.parts[-1].end
-        heights = [part.height for part in course.parts if not isinstance(part, Ramp)]
+        heights = [p.height for p in course.parts if isinstance(p, Stairs | Blocks | Waves)]
         angles = [part.angle for part in course.parts if isinstance(part, Ramp)]
         assert all(0.06 <= height <= 0.12 for height in heights)
         assert all(0.15 <= angle <= 0.3 for angle in angles)

@@ -23,7 +23,7 @@ from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.constraints import JointLimits
 from go2_wbc.wbc.contact_prices import HASTY
 from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
-from go2_wbc.wbc.explanation import BindingLimit, Explanation, _ranked, task_labels
+from go2_wbc.wbc.explanation import BindingLimit, Explanation, Gain, _ranked, task_labels
 from go2_wbc.wbc.limit_rows import places_of
 from go2_wbc.wbc.problem import SIZE, Problem, Rows
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
@@ -212,6 +212,25 @@ def test_one_unit_more_of_a_users_limit_gives_what_is_told(kind: Kind) -> None:
             np.testing.assert_allclose(fall(errors, step), limit.gives.amount, rtol=DIFFERENCES)
             told += 1
     assert told >= 5
+
+
+@pytest.mark.parametrize(
+    ("side", "at", "reach", "said"),
+    [
+        ("upper", 12.34, 9.0, "knee at 12 N m; 1 N m more gives 0.25 rad of pitch"),
+        ("upper", -1.0, 1.0, "knee at -1 N m; 1 N m more gives 0.25 rad of pitch"),
+        ("lower", 0.0, 0.5, "knee at 0 N m; 0.5 N m less gives 0.12 rad of pitch"),
+        ("lower", 10.0, 0.0, "knee at 10 N m; 1 N m less gives 0.25 rad of pitch"),
+        ("lower", -1.5, 2.0, "knee at -1.5 N m; 1 N m more gives 0.25 rad of pitch"),
+    ],
+)
+def test_a_limit_says_what_a_unit_of_it_gives(
+    side: str, at: float, reach: float, said: str
+) -> None:
+    gain = Gain("pitch", 0.25, 1.0, "rad")
+    limit = BindingLimit("knee", side, at + 1e-9, at, "N m", 3.0, gain, reach, 2.0)
+    assert str(limit) == said
+    assert limit.slack == pytest.approx(1e-9)
 
 
 def test_what_a_limit_costs_is_what_the_robot_without_it_saves() -> None:

@@ -10,6 +10,7 @@ from go2_wbc.errors import PlanNotFound, TimelineError
 from go2_wbc.legs import LEGS, Leg
 from motions import CompiledPlan, FeasibilityChecker, Timeline, deg
 from motions.dynamics.phases import Tolerance
+from motions.feasibility.goal_errors import Departure
 from tests.solver import needs_solver
 
 SWAY = (
@@ -48,6 +49,17 @@ def test_the_nearest_motion_is_feasible_and_says_how_far_off_it_is(
     assert np.degrees(departed.angle) == pytest.approx(report.margins["turned off by"].value)
     assert departed.lag == plan.dynamic[0].trajectory.lag
     assert report.as_dict()["departures"][0]["place"] == departed.place
+
+
+@pytest.mark.parametrize(
+    ("lag", "said"), [(0.02, "20 ms late"), (0.0, "0 ms late"), (-0.4, "400 ms early")]
+)
+def test_a_departure_says_where_it_is_greatest(lag: float, said: str) -> None:
+    departed = Departure(0.5, 2.0, 0.025, "FL_foot", 0.7, np.radians(4.0), 1.25, lag)
+    assert str(departed) == (
+        "0.50 to 2.00 s is the nearest to what was written: 25 mm off\n"
+        f"(FL_foot at 0.70 s), 4.0 deg (at 1.25 s), {said}."
+    )
 
 
 @needs_solver

@@ -11,7 +11,7 @@ import pytest
 from go2_wbc.errors import ConfigError, ModelMismatch
 from go2_wbc.legs import JOINT_NAMES, LEGS
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.plant.mujoco.model import FLOOR, IMU_SITE, JointDynamics, build_spec
+from go2_wbc.plant.mujoco.model import FLOOR, IMU_SITE, JointDynamics, build_spec, drawn_shapes
 from go2_wbc.plant.terrain import Boxes
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.state import JointCommand
@@ -58,6 +58,28 @@ def test_a_users_model_behaves_like_the_built_one(users_mjcf: Callable[..., Path
     assert np.abs(stand_up(user).q - stand_up(built).q)[2:].max() < EXPORT_TOLERANCE
     assert user.read().foot_forces == pytest.approx(built.read().foot_forces, rel=0.02)
     assert user.imu().accelerometer == pytest.approx(built.imu().accelerometer, abs=0.1)
+
+
+def test_what_is_drawn_of_a_users_model_moves_with_its_joints(
+    users_mjcf: Callable[..., Path],
+) -> None:
+    def edit(spec: mujoco.MjSpec) -> None:
+        cube = {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": [0.01] * 3, "mass": 0.0}
+        for body in spec.bodies:
+            if body.name in ("base", "FL_hip", "RR_calf", "world"):
+                body.add_geom(**cube, rgba=[1, 0, 0, 1], pos=[0.0, 0.0, 0.1])
+        spec.body("base").pos, spec.body("base").quat = [1.0, 2.0, 0.5], [0.6, 0.0, 0.0, 0.8]
+
+    meshes, shapes = drawn_shapes(users_mjcf(edit))
+    cubes = [one for one in shapes if one.mesh.startswith("box")]
+    assert {one.mesh for one in shapes} == meshes.keys()
+    assert {one.link: one.joint for one in cubes} == {
+        "base": "", "FL_hip": "FL_hip_joint", "RR_calf": "RR_calf_joint"
+    }  # fmt: skip
+    places = [0.0, 0.0, 0.1], [0.1934, 0.0465, 0.1], [-0.1934, -0.142, -0.113]
+    for one, place in zip(cubes, places, strict=True):
+        pose = pin.SE3(np.eye(3), np.array(place)).homogeneous
+        assert one.T_base_shape == pytest.approx(pose, abs=1e-6)
 
 
 def test_an_export_that_has_our_sensors_is_accepted(tmp_path: Path) -> None:
