@@ -59,6 +59,9 @@ def test_the_walking_speed_is_measured_and_who_creeps_on_has_not_stopped(
     assert figure_of(step, "mean speed").measured == pytest.approx(0.15, rel=1e-6)
     assert not step.ok
     assert step.reason == "mean speed 0.15 m/s, asked 0.2 +- 0.02"
+    with monkeypatch.context() as patch:
+        patch.setattr("controller.demo.steps.SPEED_UP_TIME", 100.0)
+        assert math.isnan(figure_of(step_of(FakeGo2(), "forward"), "mean speed").measured)
     monkeypatch.setattr(FakeGo2, "stop", lambda self: None)
     step = step_of(FakeGo2(), "stop")
     assert not step.ok

@@ -25,6 +25,14 @@ def bodies(model: RobotModel) -> SelfCollision:
     return SelfCollision(model)
 
 
+def test_a_pair_is_named_by_its_two_links(bodies: SelfCollision) -> None:
+    links = set(bodies._model.names) | {f.name for f in bodies._model.frames}
+    for pair in range(len(bodies.names)):
+        first, second = bodies.pair_name(pair).split("-")
+        assert {first, second} <= links
+        assert (f"{first}_0", f"{second}_0") == bodies.names[pair]
+
+
 def random_configurations(model: RobotModel, count: int, seed: int) -> np.ndarray:
     """Joint angles anywhere within their limits: links far apart, and deep in each other."""
     rng = np.random.default_rng(seed)
