@@ -1,5 +1,6 @@
 """Compiled kernels are kept, shared, and made anew when what was kept is of no use."""
 
+import json
 import logging
 import os
 import subprocess
@@ -212,6 +213,21 @@ def test_older_versions_of_a_kernel_are_not_kept_for_ever(folder: Path) -> None:
 
         assert scaled(2.0) == 2.0 * factor
     assert len(kept(folder)) == KEPT
+
+
+def test_a_list_says_which_file_a_kernel_of_the_engine_is_in(tmp_path: Path) -> None:
+    file, first = machine_code._list_file(tmp_path), ("go2_wbc.a", "a-1.code", [True])
+    machine_code._list(tmp_path, "tests.b", "b.code", [False])
+    assert not file.exists(), "it is none of the engine's"
+    machine_code._list(tmp_path, *first)
+    machine_code._list(tmp_path, "go2_wbc.c", "c.code", [])
+    told = json.loads(file.read_text(encoding="utf-8"))
+    assert told == {"go2_wbc.a": ["a-1.code", [True]], "go2_wbc.c": ["c.code", []]}
+    file.unlink()
+    machine_code._list(tmp_path, *first)
+    assert not file.exists(), "nothing is new"
+    machine_code._list(tmp_path, "go2_wbc.a", "a-2.code", [True])
+    assert json.loads(file.read_text(encoding="utf-8"))["go2_wbc.a"] == ["a-2.code", [True]]
 
 
 def test_a_constant_or_annotation_that_compiled_code_cannot_know_is_refused() -> None:

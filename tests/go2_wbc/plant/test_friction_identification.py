@@ -10,9 +10,17 @@ import pytest
 from go2_wbc.config import load_config
 from go2_wbc.errors import PlantError, PlantTimeout
 from go2_wbc.plant import MujocoPlant, Plant
-from go2_wbc.plant.friction_identification import FrictionEstimate, fitted, identify_friction
+from go2_wbc.plant.friction_identification import (
+    OVER_THE_BACK,
+    FrictionEstimate,
+    _all_legs,
+    fitted,
+    identify_friction,
+)
 from go2_wbc.plant.mujoco.model import JointDynamics
+from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand, RobotState
+from tests.controller.plants import lying_state
 from tests.go2_wbc.plant.helpers import stand_up
 
 DRY_ERROR, VISCOUS_ERROR = 0.04, 0.06  # [N m], [N m s/rad]; measured 0.02 and 0.04 at most
@@ -38,6 +46,50 @@ class Doctored(Plant):
 
     def close(self) -> None:
         self._inner.close()
+
+
+class Obedient(Plant):
+    """Its joints go as they are told, against friction, which is more near the ends of a way."""
+
+    def __init__(self) -> None:
+        self._model, self.sent = RobotModel(), list[JointCommand]()
+        self._state = lying_state(3.0)
+
+    @property
+    def control_period(self) -> float:
+        return 0.03
+
+    def read(self) -> RobotState:
+        return self._state
+
+    def write(self, command: JointCommand) -> None:
+        self.sent.append(command)
+        q, v = self._state.q.copy(), np.zeros(18)
+        if command.kp.any():
+            q[7:], v[6:] = command.q_des, command.v_des
+        time, air = self._state.time + self.control_period, np.zeros(4, dtype=bool)
+        state = RobotState(time, q, v, np.zeros(12), np.zeros(4), air)
+        off = np.abs(q[7:] - _all_legs(OVER_THE_BACK)).max() > 0.21
+        friction = (0.3 + 0.5 * off) * np.sign(v[6:]) + 0.2 * v[6:]
+        self._state = replace(state, tau=self._model.snapshot(state).bias[6:] + friction)
+
+    def close(self) -> None: ...
+
+
+def test_of_joints_that_follow_the_friction_is_found_exactly() -> None:
+    plant, shares = Obedient(), list[float]()
+    found = identify_friction(plant, on_progress=shares.append)
+    np.testing.assert_allclose(found.dry, 0.3, atol=1e-9)
+    np.testing.assert_allclose(found.viscous, 0.2, atol=1e-9)
+    np.testing.assert_allclose(shares, np.arange(1, 13) / 12)
+    moved = np.array([command.q_des for command in plant.sent if command.kp.any()])
+    assert np.ptp(moved, axis=0).min() > 0.79
+    left, right = np.array([0.3, 1.3, -2.66]), np.array([-0.3, 1.3, -2.66])
+    np.testing.assert_allclose(moved[-1], np.tile([*left, *right], 2), atol=0.01)
+    limp = [command for command in plant.sent if not command.kp.any()]
+    assert limp == plant.sent[-10:]
+    assert all((command.kd == 3.0).all() for command in limp)
+    assert 50.0 < plant.read().time - 3.0 < 70.0
 
 
 def noisy(dynamics: JointDynamics) -> MujocoPlant:

@@ -69,6 +69,21 @@ def test_another_robot_falls_for_itself(folder: Path, falls: list[float]) -> Non
     assert len(falls) == len(kept(folder)) == 5
 
 
+@pytest.mark.usefixtures("falls")
+def test_what_mujoco_has_warned_of_is_not_kept(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fall = settling._come_to_rest
+
+    def badly(model: mujoco.MjModel, data: mujoco.MjData, *others: object) -> None:
+        fall(model, data, *others)  # pyright: ignore[reportArgumentType]
+        data.warning[mujoco.mjtWarning.mjWARN_CNSTRFULL].number = 1
+
+    monkeypatch.setattr(settling, "_come_to_rest", badly)
+    MujocoPlant()
+    assert not kept(folder)
+
+
 @pytest.mark.parametrize("damage", [b"", b"x" * 99, None])
 def test_a_damaged_file_is_made_anew(
     folder: Path, falls: list[float], damage: bytes | None
