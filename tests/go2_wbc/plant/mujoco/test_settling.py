@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from go2_wbc.errors import PlantError
 from go2_wbc.machine_code import CACHE_VARIABLE, kernel_folder
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco import setup as settling
@@ -69,7 +70,6 @@ def test_another_robot_falls_for_itself(folder: Path, falls: list[float]) -> Non
     assert len(falls) == len(kept(folder)) == 5
 
 
-@pytest.mark.usefixtures("falls")
 def test_what_mujoco_has_warned_of_is_not_kept(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -80,7 +80,8 @@ def test_what_mujoco_has_warned_of_is_not_kept(
         data.warning[mujoco.mjtWarning.mjWARN_CNSTRFULL].number = 1
 
     monkeypatch.setattr(settling, "_come_to_rest", badly)
-    MujocoPlant()
+    with pytest.raises(PlantError, match="arena"):
+        MujocoPlant()
     assert not kept(folder)
 
 
