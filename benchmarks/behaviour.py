@@ -91,9 +91,6 @@ def measure_goals(trial: Trial, found: TrialResult) -> None:
         found.values["drift"] = 1000.0 * math.hypot(x, y)
 
 
-# --- the demo -------------------------------------------------------------------------------------
-
-
 def measure_demo(trial: Trial, found: TrialResult) -> None:
     """Run the demo and check every step that it calls done by this module's own criteria.
 

@@ -20,8 +20,6 @@ from go2_wbc.files import write_atomically
 
 SEEDS, QUICK_SEEDS = 20, 3
 
-# --- options --------------------------------------------------------------------------------------
-
 positive = reader(int, lambda value: value > 0, "at least 1")
 Sensors = Annotated[
     str, "true state, or the robot's own sensors; default %(default)s", (IDEAL, IMU)
@@ -160,9 +158,6 @@ class Benchmark:
             return ExitCode.OK
         report = summarise(studies, measure_all(self.name, tasks, jobs=jobs, resume=resume))
         return output.publish(report.as_dict(), render(report))
-
-
-# --- runs -----------------------------------------------------------------------------------------
 
 
 def measure_all(name: str, tasks: Sequence[Task], *, jobs: int, resume: bool) -> Results:

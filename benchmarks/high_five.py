@@ -108,9 +108,6 @@ def largest_slip(recorded: TruthRecording, support: list[Leg]) -> float:
     return float(np.linalg.norm(np.cumsum(steps, axis=0), axis=2).max())
 
 
-# --- impacts on the held paw ----------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class Impact:
     """A ``force`` [N] on the held paw for ``duration`` [s]; ``name`` begins its rows' names."""

@@ -162,8 +162,6 @@ ON_SENSORS = (
 """The same on its own sensors; at 3 m/s all that is asked for is not to fall, at 3.5 nothing."""
 
 
-# --- what the estimate makes of it ----------------------------------------------------------------
-
 ODOMETRY_SPEED = 0.5  # m/s
 EACH = 3.0  # s
 SLOPE = math.radians(15.0)

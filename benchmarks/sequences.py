@@ -166,9 +166,6 @@ def drawn(rng: np.random.Generator, mode: Mode, gaits: Sequence[str]) -> Call:
     )
 
 
-# --- making calls, and judging them ---------------------------------------------------------------
-
-
 class _Hangs(Exception):
     """A call that does not end."""
 

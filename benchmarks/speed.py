@@ -89,9 +89,6 @@ DATASET = {
 }
 
 
-# --- checking a motion ----------------------------------------------------------------------------
-
-
 def lively_motion(seconds: float) -> Timeline:
     """Trunk, feet and balance in turn, over and over for about that long."""
     unit = Timeline().body(pitch=0.1, z=-0.02, over=0.5).body(roll=0.05, over=0.5)
@@ -114,9 +111,6 @@ def measure_checks(_trial: Trial, found: TrialResult) -> None:
         acts[f"compile.{name}"] = line.end, partial(compile_timeline, line, checker().model)
     rounds = [{n: timed(act, 1)[0] / end for n, (end, act) in acts.items()} for _ in range(ROUNDS)]
     found.values = {n: float(np.median([spent[n] for spent in rounds])) / 100.0 for n in acts}
-
-
-# --- how long a user waits: for a robot, for it to stand, for the demo's table --------------------
 
 
 def measure_startup(_trial: Trial, found: TrialResult) -> None:
@@ -154,9 +148,6 @@ def started(code: str) -> tuple[float, float]:
 def _children_time() -> float:
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
-
-
-# --- how fast learners get what they learn from ---------------------------------------------------
 
 
 def measure_environments(_trial: Trial, found: TrialResult) -> None:

@@ -285,9 +285,6 @@ def measure_realtime(trial: Trial, found: TrialResult) -> None:
     }
 
 
-# --- a bare loop ----------------------------------------------------------------------------------
-
-
 def bare_work(duration: float) -> Callable[[], object]:
     """Hashes as many bytes as take ``duration`` [us], the median, and allocates nothing."""
     sample = bytes(4096)

@@ -168,9 +168,6 @@ WORLDS = (
 )
 
 
-# --- other people's robots ------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class Robot:
     """One robot."""

@@ -206,9 +206,6 @@ def motion_error(snapshot: Snapshot, solution: WbcSolution) -> float:
     return float(np.abs(M @ solution.qdd + h - generalised).max())
 
 
-# --- the mirror image in the sagittal plane -------------------------------------------------------
-
-
 def mirrored_joints(values: np.ndarray) -> np.ndarray:
     """Legs change sides; the abduction joint (first of a leg) changes its sign."""
     return (values.reshape(4, 3)[MIRRORED_LEGS] * [-1.0, 1.0, 1.0]).ravel()

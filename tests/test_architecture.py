@@ -36,9 +36,6 @@ def function_of(lines: int, name: str = "f") -> str:
     return f'def {name}():\n    """Say.\n\n    More.\n    """\n{body}\n'
 
 
-# --- this project keeps the rules ---------------------------------------------------------------
-
-
 def test_the_checker_sees_all_packages(project: list[rules.Module]) -> None:
     assert {module.path.split("/")[0] for module in project} == set(rules.PACKAGES)
     assert "go2_wbc/errors.py" in {module.path for module in project}
@@ -77,9 +74,6 @@ def test_no_file_is_too_long(project: list[rules.Module]) -> None:
 
 def test_functions_stay_small(project: list[rules.Module]) -> None:
     assert rules.long_functions(project) == []
-
-
-# --- each rule catches a tree that breaks it ----------------------------------------------------
 
 
 def test_every_contract_catches_an_import_that_breaks_it(tmp_path: Path) -> None:

@@ -89,9 +89,6 @@ class Case:
         return f"{self.where} = {self.value!r:.40}"
 
 
-# --- what a type does not take --------------------------------------------------------------------
-
-
 def bad_values(kind: object) -> list[object]:
     """Values that the type ``kind`` does not take."""
     parts = typing.get_args(kind)
@@ -117,9 +114,6 @@ def _holds(value: object, values: list[object]) -> bool:
     return any(
         value is other or (type(value) is type(other) and value == other) for other in values
     )
-
-
-# --- signatures -----------------------------------------------------------------------------------
 
 
 def public() -> Iterator[tuple[str, Callable[..., Any], Callable[[], object] | None]]:
@@ -255,9 +249,6 @@ def good(where: str, name: str) -> object:
     return GOOD[f"{where}({name})" if f"{where}({name})" in GOOD else name]()
 
 
-# --- keys of a configuration file -----------------------------------------------------------------
-
-
 def of_keys() -> Iterator[Case]:
     """A case for each bad value of each key of a configuration."""
     from go2_wbc import Config
@@ -297,9 +288,6 @@ BAD_TOML = {
     str: ("5", '""', '"nonsense"', "[]"),
     tuple: ('"three"', "5", "[]", "[nan, nan, nan]", "[1e300, 1e300, 1e300]", "{}"),
 }
-
-
-# --- options of the command line ------------------------------------------------------------------
 
 
 def of_options() -> Iterator[Case]:
@@ -397,9 +385,6 @@ def stop_before_work() -> None:
             setattr(getattr(importlib.import_module(module), name), method, reached)
 
 
-# --- running them ---------------------------------------------------------------------------------
-
-
 class _TooLong(BaseException):
     pass
 
@@ -456,9 +441,6 @@ def main() -> int:
         print(f"{case}: {said}")
     print(f"{len(cases)} bad inputs, {len(wrong)} not refused as they must be")
     return int(bool(wrong))
-
-
-# --- tests ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -59,9 +59,6 @@ PYTHON: dict[str, Block] = {
 RUNNING = {name: block for name, block in PYTHON.items() if not block.text.startswith(NOT_RUN)}
 
 
-# --- blocks -----------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 def test_every_block_of_the_tutorial_does_and_prints_what_it_says(tmp_path: Path) -> None:
     """One after the other in one folder, as a reader would."""
@@ -128,9 +125,6 @@ def test_a_difference_between_what_is_shown_and_printed_is_seen() -> None:
         f"{printed}more\n",
     ):
         assert difference(wrong, printed) != ""
-
-
-# --- the language -----------------------------------------------------------------------------
 
 
 def test_the_reference_names_every_method_of_the_language_with_its_arguments() -> None:
@@ -203,9 +197,6 @@ def test_an_error_of_the_reference_reads_as_it_says(code: str, message: str) -> 
     assert str(caught.value) == message
 
 
-# --- feasibility ------------------------------------------------------------------------------
-
-
 def test_every_check_that_the_report_can_name_is_explained(checker: FeasibilityChecker) -> None:
     plan = compile_timeline(load_motion("bow"), checker.model)
     far = Timeline().foot("FR", x=0.7, z=0.1, over=1.0).home(over=1.0)
@@ -261,9 +252,6 @@ def test_the_limits_in_the_table_are_those_of_the_checker() -> None:
 def test_the_page_has_a_place_for_the_table_of_the_benchmark() -> None:
     text = page(FEASIBILITY)
     assert 0 < text.index("<!-- feasibility:begin") < text.index("<!-- feasibility:end -->")
-
-
-# --- the controller, the command line, the configuration --------------------------------------
 
 
 def test_the_table_of_methods_names_every_public_member_and_no_other() -> None:

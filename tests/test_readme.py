@@ -70,9 +70,6 @@ def test_the_citation_names_this_version_and_licence() -> None:
     assert "authors:\n  - name: The go2_wbc authors\n" in page("CITATION.cff")
 
 
-# --- all pages --------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", PAGES)
 def test_every_command_is_one_of_the_command_line_with_options_that_exist(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -49,9 +49,6 @@ def extension(name: str) -> ModuleType:
     return import_module(name)
 
 
-# --- the site ---------------------------------------------------------------------------------
-
-
 @pytest.mark.skipif(BUILT is None, reason="`make docs` builds the site, and runs this test on it")
 def test_the_links_of_the_site_lead_somewhere_and_its_pages_are_whole() -> None:
     target = Path(BUILT or "").resolve()
@@ -97,8 +94,6 @@ def test_a_link_that_leads_nowhere_and_a_page_that_needs_a_network_are_seen(
     (tmp_path / "p.png").write_bytes(b"")
     assert problems(tmp_path) == expected
 
-
-# --- where links lead -------------------------------------------------------------------------
 
 LOADS = {"img": "src", "script": "src", "link": "href", "source": "src", "iframe": "src"}
 NOT_LOADED = frozenset({"canonical", "next", "prev", "index", "search", "author", "copyright"})
@@ -151,9 +146,6 @@ def _leads_somewhere(url: str, file: Path, pages: dict[Path, _Page]) -> bool:
         return False
     anchors = pages[target].anchors if target in pages else set()
     return not parts.fragment or target.suffix != ".html" or unquote(parts.fragment) in anchors
-
-
-# --- what the build makes from the code -------------------------------------------------------
 
 
 def test_a_box_lies_above_what_it_imports_and_arrows_that_follow_are_left_out() -> None:

@@ -225,9 +225,6 @@ FEET = tuple(
 )
 
 
-# --- steps, walks, turns and trots, with other tracks beside them ---------------------------------
-
-
 def _long_step(draw: Draw, s: float) -> Timeline:
     axis, size = draw.one_of((("x", 0.12), ("y", 0.08)))
     leg, way = draw.leg(), {axis: s * draw.sign() * size}

@@ -163,9 +163,6 @@ ROWS = (
 BORDERS = Study("borders", {"border": ROWS}, measure_border, prefix="")
 
 
-# --- the file of borders --------------------------------------------------------------------------
-
-
 def read_borders(path: Path = BORDERS_FILE) -> dict[str, float | None]:
     """The amplitudes at which physics changes its mind, by draw.
 

@@ -91,9 +91,6 @@ def test_motions_of_which_none_judges_are_refused_before_one_is_played() -> None
         run(motions=first, output=Output())
 
 
-# --- the fit ----------------------------------------------------------------------------------
-
-
 TRUTH = ProbabilityModel(
     {"slip": Rise(0.03, 0.5, 0.3), "torque": Rise(3.0, -0.4, 0.2)}, rest=3.0, leak=0.05
 )
@@ -151,9 +148,6 @@ def test_chances_that_are_too_sure_are_told() -> None:
     assert honest.error < 0.06
     assert boastful.error > 0.15
     assert sum(count for *_, count in honest.bins) == 1000
-
-
-# --- motions and worlds -----------------------------------------------------------------------
 
 
 def test_every_motion_has_the_worlds_of_its_half() -> None:

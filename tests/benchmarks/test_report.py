@@ -17,9 +17,6 @@ NEEDED = {
 """Keys of a row in the JSON that programs rely on."""
 
 
-# --- arithmetic of a metric ---------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("metric", "values", "mean", "worst", "seed", "passed"),
     [
@@ -57,9 +54,6 @@ def test_no_failure_passes_however_good_other_values_are() -> None:
     result = summarise_metric(SPEED, measured(2.0, math.nan))
     assert result.passed is False
     assert (result.mean, result.worst_seed, set(result.failures)) == (2.0, 1, {1})
-
-
-# --- report -------------------------------------------------------------------------------------
 
 
 def test_the_table_fits_80_columns_with_numbers_apart_and_names_the_fallen_seed() -> None:

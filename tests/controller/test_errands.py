@@ -100,9 +100,6 @@ def test_what_was_asked_before_the_end_is_done_and_later_or_unserved_not(errands
     assert not done
 
 
-# --- log lines ----------------------------------------------------------------------------------
-
-
 def test_lines_are_written_in_order_until_it_is_closed() -> None:
     written: list[str] = []
     log = BackgroundLog(lambda message, *args: written.append(message % args))

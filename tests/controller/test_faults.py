@@ -42,9 +42,6 @@ class TestWatchedPlantContract(PlantContract):
         return WatchedPlant()
 
 
-# --- the QP -----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("count", "limp"), [(1, 0), (6, 5)])
 def test_a_few_infeasible_qps_damp_the_robot_at_most_and_it_stands_all_the_same(
     plant: WatchedPlant, go2: GO2Controller, monkeypatch: pytest.MonkeyPatch, count: int, limp: int
@@ -74,9 +71,6 @@ def test_a_qp_that_stays_infeasible_ends_in_a_limp_robot_that_says_why(
     with pytest.raises(ModeError, match="not damped"):
         go2.move(0.1)
     assert go2.stand()
-
-
-# --- plants -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -133,9 +127,6 @@ def test_a_clock_that_does_not_go_on_and_a_state_that_is_not_finite_end_the_call
     assert f"no {lack} state" in go2.last_outcome.reason
 
 
-# --- other threads ----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("realtime", [False, True])
 def test_damp_from_another_thread_ends_the_call_honestly(
     plant: WatchedPlant, *, realtime: bool
@@ -149,9 +140,6 @@ def test_damp_from_another_thread_ends_the_call_honestly(
         assert call.result(HANG_GUARD) is False
         assert go2.mode is Mode.DAMPED
         assert go2.last_outcome.reason == "damped by damp()"
-
-
-# --- robots that cannot -----------------------------------------------------------------------
 
 
 def test_a_robot_pushed_over_in_the_middle_of_a_call_says_that_it_fell(

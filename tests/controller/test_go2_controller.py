@@ -76,8 +76,6 @@ def standing() -> Iterator[GO2Controller]:
         yield go2
 
 
-# --- the day ----------------------------------------------------------------------------------
-
 MODES = {
     "stand": Mode.STANDING,
     "sit": Mode.SITTING,
@@ -162,9 +160,6 @@ def test_a_velocity_command_moves_the_robot_that_way(day: Day) -> None:
     assert step.after.rpy[2] - step.before.rpy[2] == pytest.approx(0.2 * 1.5, rel=0.25)
 
 
-# --- the beginning ----------------------------------------------------------------------------
-
-
 def test_a_new_robot_lies_limp_at_time_zero_and_time_passes_in_calls_only() -> None:
     with GO2Controller(namespace="rex_2") as go2:
         assert go2.namespace == "rex_2"
@@ -201,9 +196,6 @@ def test_the_same_script_twice_gives_the_same_states_bit_by_bit() -> None:
             return [first, go2.state]
 
     assert all(same(a, b) for a, b in zip(script(), script(), strict=True))
-
-
-# --- modes and commands -----------------------------------------------------------------------
 
 
 def test_moving_needs_walking_mode(standing: GO2Controller) -> None:
@@ -268,9 +260,6 @@ def test_a_command_beyond_the_envelope_is_clipped_and_logged(
     assert go2.last_outcome.ok
 
 
-# --- motions ----------------------------------------------------------------------------------
-
-
 def test_a_motion_from_another_stance_is_refused_and_nothing_happens() -> None:
     with GO2Controller() as go2:
         with pytest.raises(StanceMismatch, match="starts from stand, the robot is lying"):
@@ -299,9 +288,6 @@ def test_a_high_five_plays_by_its_name_and_measures_how_high_the_paw_was_held(
     assert standing.high_five("left", hold=0.5), standing.last_outcome.reason
     assert standing.last_outcome.measured["least paw height [m]"] > 0.5
     assert standing.mode is Mode.STANDING
-
-
-# --- goals and other threads ----------------------------------------------------------------
 
 
 def test_during_a_goal_move_is_refused_and_stop_ends_it(

@@ -86,8 +86,6 @@ def test_no_viewer_where_there_is_no_display_or_another_plant(
         assert "the viewer shows MuJoCo plants only" in caplog.text
 
 
-# --- the end ----------------------------------------------------------------------------------
-
 ARGUMENTS = {
     **dict.fromkeys(("wait", "move_forward", "turn_left", "turn_right"), (1.0,)),
     "play": ("high_five",),

@@ -21,9 +21,6 @@ STILL = 0.008
 """Distance [m] that a foot which stands may slide: less than the 10 mm that count as a slip."""
 
 
-# --- compiled and checked by a caller -------------------------------------------------------------
-
-
 def test_a_checked_motion_is_played_or_refused_by_the_report_that_it_has(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -49,9 +46,6 @@ def test_a_high_five_takes_the_plan_of_a_caller_who_has_one(
     with GO2Controller() as go2:
         assert go2.stand()
         assert go2.high_five("left", hold=0.5, plan=plan), go2.last_outcome.reason
-
-
-# --- the nearest to a motion that cannot be done --------------------------------------------------
 
 
 @needs_solver
@@ -100,9 +94,6 @@ def test_feet_stand_still_on_the_floor_that_a_quick_sway_was_solved_for(model: R
     run = play(plan, model, seed=0)
     assert run.said, run.reason
     assert run.slip < STILL
-
-
-# --- dynamic motions, on what may be a robot ------------------------------------------------------
 
 
 class LivePlant(StillPlant):

@@ -109,9 +109,6 @@ def test_the_motor_is_the_same_for_robot_controller_and_check(motor: str) -> Non
             assert np.array_equal(found.no_load_speed, expected)
 
 
-# --- tasks of a user's own ------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class SteadyTrunk(Task):
     """Slow the trunk's turning down, and note which robots were asked."""

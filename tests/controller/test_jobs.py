@@ -118,9 +118,6 @@ def threaded(robot: Robot) -> Iterator[Client]:
     assert "jobs" not in [thread.name for thread in threading.enumerate()]
 
 
-# --- one after the other ------------------------------------------------------------------------
-
-
 def test_a_job_is_answered_after_it_was_carried_out_with_what_was_measured(
     robot: Robot, client: Client
 ) -> None:
@@ -207,9 +204,6 @@ def test_somebody_who_fails_to_hear_of_an_end_does_not_stop_the_server(
     assert "sit could not be answered" in caplog.text
 
 
-# --- queue and patience -------------------------------------------------------------------------
-
-
 def test_queued_jobs_have_their_turns_in_order_and_one_too_many_is_refused(queued: Client) -> None:
     done: list[str] = []
     for name in "abcd":
@@ -246,9 +240,6 @@ def test_after_the_patience_what_runs_has_begun_and_what_waits_is_refused(
     queued.jobs.work()
     assert queued.only("late").ok
     assert not queued.jobs.work()
-
-
-# --- preparation --------------------------------------------------------------------------------
 
 
 def test_a_job_is_prepared_in_another_thread_and_carried_out_afterwards(client: Client) -> None:
@@ -326,9 +317,6 @@ def worked_off(client: Client) -> None:
     raise AssertionError("the job was prepared and not carried out")
 
 
-# --- calling off --------------------------------------------------------------------------------
-
-
 def test_a_job_that_is_called_off_says_so_and_then_whoever_wants_to_know_is_told(
     robot: Robot, client: Client
 ) -> None:
@@ -380,9 +368,6 @@ def test_a_robot_goes_limp_before_an_action_begins_or_after_never_in_between(
     assert robot.calls == ["begin", "damp"]
 
 
-# --- the end ------------------------------------------------------------------------------------
-
-
 def test_at_the_end_whoever_waits_is_told_once_and_nothing_is_accepted_any_more(
     robot: Robot, queued: Client
 ) -> None:
@@ -416,9 +401,6 @@ def test_a_job_that_outlives_the_server_is_called_off_and_not_answered_again(
     threaded.jobs.abandon("the server is ending", HANG_GUARD)
     assert threaded.only("dance").reason == "the server is ending"
     assert "failed" not in caplog.text
-
-
-# --- many threads -------------------------------------------------------------------------------
 
 
 def test_many_threads_get_one_answer_for_each_job_and_one_job_runs_at_a_time(

@@ -79,9 +79,6 @@ def tilt(plant: StillPlant, roll: float) -> None:
     plant.state = replace(plant.state, q=q)
 
 
-# --- late commands ----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("is_hardware", [False, True])
 def test_a_simulated_robot_is_taken_where_it_will_be_and_one_that_may_be_real_where_it_is(
     request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, *, is_hardware: bool
@@ -95,9 +92,6 @@ def test_a_simulated_robot_is_taken_where_it_will_be_and_one_that_may_be_real_wh
     run(loop, 1)
     assert (loop.snapshot.state is loop.state) is is_hardware
     assert loop.snapshot.state.time == loop.state.time
-
-
-# --- QP failures ------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("broken", [range(5, 6), range(5, 9)])
@@ -151,9 +145,6 @@ def test_a_new_behaviour_has_the_whole_patience_again(
     assert loop.telemetry.qp_failures == 3 * SAFETY.qp_patience
 
 
-# --- constraints that give way ----------------------------------------------------------------
-
-
 def relax(monkeypatch: pytest.MonkeyPatch, stance: float) -> None:
     """Make every solution a relaxed one, the stance feet violated by ``stance`` [m/s^2]."""
     real = WholeBodyController.solve
@@ -200,9 +191,6 @@ def test_grave_violations_damp_the_robot_only_when_they_last(
     assert 2 * within <= loop.telemetry.grave_ticks <= 2 * within + 2
 
 
-# --- plants that fail -------------------------------------------------------------------------
-
-
 def test_a_plant_whose_clock_stands_still_is_reported_after_the_limit(
     loop: ControlLoop, plant: StillPlant
 ) -> None:
@@ -239,9 +227,6 @@ def test_a_plant_without_a_finite_first_state_is_refused(
     plant.state = replace(plant.state, q=np.full(19, np.nan))
     with pytest.raises(PlantError, match="first state of the plant is not finite"):
         ControlLoop(plant, model, WholeBodyController(model), Telemetry(model, 10), SAFETY)
-
-
-# --- falls ------------------------------------------------------------------------------------
 
 
 def test_a_robot_whose_legs_have_folded_has_fallen(loop: ControlLoop, plant: StillPlant) -> None:

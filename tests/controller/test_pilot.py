@@ -16,8 +16,6 @@ from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline, load_motion
 from tests.controller.plants import MID_RISE, PERIOD, StillPlant, WatchedPlant, is_limp
 
-# --- only what was measured -------------------------------------------------------------------
-
 
 @pytest.mark.parametrize("call", ["stand", "sit", "walk"])
 def test_a_robot_that_does_not_move_never_gets_a_yes(call: str) -> None:
@@ -59,9 +57,6 @@ def test_a_goal_that_is_not_reached_is_not_done_and_says_how_far_it_got(
     assert (go2.turn_left(0.3) if goal is TurnInPlace else go2.move_forward(0.5)) is False
     assert go2.last_outcome.reason.startswith(reason)
     assert go2.mode is Mode.WALKING
-
-
-# --- modes after failures ---------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("has_slid", "counted_on"), [(True, 0.15), (False, MOST_FRICTION)])

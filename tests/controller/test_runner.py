@@ -87,9 +87,6 @@ def loop_threads() -> set[threading.Thread]:
     return {thread for thread in threading.enumerate() if thread.name == "go2-loop"}
 
 
-# --- without realtime -------------------------------------------------------------------------
-
-
 def test_time_passes_in_calls_only_and_on_each_until_it_is_done_or_at_its_limit(
     runner: Runner, plant: StillPlant
 ) -> None:
@@ -169,9 +166,6 @@ def test_the_last_word_to_the_plant_is_to_go_limp(runner: Runner, plant: StillPl
     assert not is_limp(plant.commands[-1])
     close(runner)
     assert is_limp(plant.commands[-1])
-
-
-# --- realtime ---------------------------------------------------------------------------------
 
 
 def test_in_realtime_time_passes_by_itself(make_runner: MakeRunner, plant: StillPlant) -> None:

@@ -62,9 +62,6 @@ def refusals(plant: WatchedPlant, time: float, call: Callable[[], object]) -> li
     return refused
 
 
-# --- calls from other threads -----------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     "call",
     [
@@ -126,8 +123,6 @@ def test_a_motion_that_is_cancelled_while_it_begins_is_left_at_once(
     assert go2.mode is Mode.STANDING
     assert go2.state.time - before < 4.0
 
-
-# --- Ctrl-C -----------------------------------------------------------------------------------
 
 INTERRUPTED: dict[str, tuple[Do, Do, str]] = {
     "lying": (_nothing, _wait, "wait"),
@@ -254,9 +249,6 @@ def test_ctrl_c_while_a_motion_is_planned_is_raised_at_once_and_the_robot_stands
         assert is_limp(plant.commands[-1])
     finally:
         signal.signal(signal.SIGINT, usual)
-
-
-# --- a user's own code ------------------------------------------------------------------------
 
 
 class Failing(Task):

@@ -51,9 +51,6 @@ def held(module: str, name: str) -> object:
         return getattr(importlib.import_module(module), name)
 
 
-# --- names ----------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("module", stored("imports.json"))
 def test_every_name_can_be_imported(module: str) -> None:
     for name in stored("imports.json")[module]:
@@ -148,9 +145,6 @@ def test_every_gait_motion_back_end_and_solver_is_there() -> None:
         WholeBodyController(model, "full", WbcConfig(solver=solver))
 
 
-# --- the configuration ----------------------------------------------------------------------------
-
-
 @pytest.mark.filterwarnings("ignore::FutureWarning")
 def test_a_file_with_every_key_is_read() -> None:
     config = load_config(STORED / "config.toml")
@@ -174,9 +168,6 @@ def test_every_key_is_followed_or_warned_of(
     if not any(place[-1] in line for line in lines):
         found = attrgetter(".".join(place))(config)
         assert found == (tuple(value) if isinstance(value, list) else value)
-
-
-# --- files ----------------------------------------------------------------------------------------
 
 
 def test_a_motion_is_read_as_it_was_written(tmp_path: Path) -> None:

@@ -80,9 +80,6 @@ def _mutated(mutate: Mutator, rng: np.random.Generator) -> Timeline | None:
         return None
 
 
-# --- what is broken ---------------------------------------------------------------------------
-
-
 def _larger(line: Timeline, rng: np.random.Generator) -> Timeline:
     """One move of the trunk several times as large."""
     key = _one(line, BodyKey, rng, lambda key: key.value != 0.0)
@@ -186,9 +183,6 @@ def _with(line: Timeline, old: Key, new: Key) -> Timeline:
 
 def _without(line: Timeline, old: Key) -> Timeline:
     return replace(line, keys=tuple(key for key in line.keys if key is not old), cursor=line.end)
-
-
-# --- the oracle -------------------------------------------------------------------------------
 
 
 def limit_broken(line: Timeline, model: RobotModel) -> str:

@@ -153,9 +153,6 @@ def test_a_border_is_searched_for_its_own_draw_from_amplitude_1(
     assert min(q.amplitude for q in asked) >= draws()[row][0].low
 
 
-# --- the file of borders --------------------------------------------------------------------------
-
-
 KEPT: dict[str, float | None] = {"crouch 0": 1.25, "rise 0": None}
 
 

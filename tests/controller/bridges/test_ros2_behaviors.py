@@ -118,9 +118,6 @@ def test_damp_in_a_posture_ends_it() -> None:
         assert go2.mode is Mode.DAMPED
 
 
-# --- motions ------------------------------------------------------------------------------------
-
-
 def played(go2: GO2Controller, motion: str, *settings: str) -> Outcome:
     jobs, answers, answered = jobs_of(go2), [], threading.Event()
     assert jobs.submit(motion_job(motion, settings, go2, answers.append))
@@ -205,9 +202,6 @@ def test_settings_are_read_as_numbers_or_words() -> None:
     assert read == {"hold": 2.5, "times": 3, "side": "left"}
     with pytest.raises(CommandError, match="'side='"):
         parse_values(["side="])
-
-
-# --- velocities ---------------------------------------------------------------------------------
 
 
 @pytest.fixture

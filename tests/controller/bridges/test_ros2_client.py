@@ -42,9 +42,6 @@ def go2(server: Process) -> Iterator[Any]:
     node.destroy_node()
 
 
-# --- without a server ---------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("method", "command"), [("sit", "sit"), ("stand", "up"), ("walk", "walk")])
 @pytest.mark.parametrize("done", [True, False])
 def test_a_behaviour_sends_its_command_and_hands_on_the_answer(
@@ -96,9 +93,6 @@ def test_without_init_the_client_says_what_to_call_first() -> None:
         pytest.raises(BridgeError, match=r"rclpy\.init\(\)"),
     ):
         GO2ControllerNode()
-
-
-# --- against a server ---------------------------------------------------------------------------
 
 
 def demo(*options: str) -> Done:

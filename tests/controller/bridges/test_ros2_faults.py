@@ -101,9 +101,6 @@ def at(graph: None, request: pytest.FixtureRequest) -> Iterator[Scene]:
         assert math.degrees(probe.largest_tilt) <= TILT_LIMIT  # nan if no odometry was heard
 
 
-# --- what is required -----------------------------------------------------------------------------
-
-
 def require_done(answer: Any) -> None:
     """That an order was carried out."""
     assert answer.success, f"an order was not carried out: {answer.message}"
@@ -140,9 +137,6 @@ def require_refused(server: Process, namespace: str) -> None:
     require_said(f"/{namespace} is already served", said)
     require_said("--namespace", said)
     assert "Traceback" not in said, said
-
-
-# --- the faults -----------------------------------------------------------------------------------
 
 
 def test_a_robot_stops_whose_client_is_killed_while_it_walks(at: Scene) -> None:

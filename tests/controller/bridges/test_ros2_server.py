@@ -163,9 +163,6 @@ def listen(probe: WatchingProbe, topics: dict[str, tuple[Any, str]]) -> dict[str
     return heard
 
 
-# --- the action ---------------------------------------------------------------------------------
-
-
 def goal_of(probe: WatchingProbe, motion: str, *settings: str) -> tuple[Any, list[Any]]:
     """The goal's handle and the list that its feedback goes to."""
     from quadropted_msgs.action import PlayMotion
@@ -210,9 +207,6 @@ def test_a_motion_that_does_not_exist_is_aborted_with_the_names(probe: WatchingP
     answer = probe.result(handle.get_result_async())
     assert answer.status == 6  # aborted
     assert "unknown motion 'levitate'; valid: beckon," in answer.result.message
-
-
-# --- other ways to serve ------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")

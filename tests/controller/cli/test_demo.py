@@ -50,9 +50,6 @@ def demo_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Run) -> Preten
     return demo_of
 
 
-# --- the command --------------------------------------------------------------------------------
-
-
 def test_a_good_run_prints_the_table_leaves_its_files_and_exits_with_0(
     tmp_path: Path, demo_of: Pretend
 ) -> None:
@@ -206,9 +203,6 @@ def test_the_script_of_the_course_is_the_same_command(
     assert capsys.readouterr().out.startswith("usage: go2-wbc demo")
 
 
-# --- the filmstrip ------------------------------------------------------------------------------
-
-
 def test_the_filmstrip_shows_sitting_swinging_and_the_raised_paw() -> None:
     go2 = FakeGo2()
     report, recording = run_demo(go2), go2.recording()
@@ -235,9 +229,6 @@ def test_the_filmstrip_of_a_terrain_shows_three_moments_and_of_no_walk_what_it_c
     assert times == pytest.approx([start + 0.5, start + 1.0, start + 1.5])
     go2 = FakeGo2(falls_in="walk")
     assert demo.filmstrip_times(run_demo(go2), go2.recording()) is None
-
-
-# --- the real thing -----------------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -268,9 +259,6 @@ def test_the_real_demo_does_every_step_inside_the_limits(
 COLUMNS = 80
 LONG_REASON = "fell at t=3.2 s: " + "roll 71 deg, " * 12
 TOTALS = DemoTotals(0.44, 0.42, math.nan, math.nan, 0, 24.5, 8.2)
-
-
-# --- the table ----------------------------------------------------------------------------------
 
 
 def report_of(*steps: StepResult) -> DemoReport:
@@ -310,9 +298,6 @@ def test_a_terminal_without_ticks_gets_words(encoding: str | None) -> None:
     assert "  ok sit" in text
     assert "FAIL s" in text
     assert text.isascii()
-
-
-# --- the progress line --------------------------------------------------------------------------
 
 
 def test_on_a_terminal_progress_is_one_line_in_place_that_tells_of_solving(

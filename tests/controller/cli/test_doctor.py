@@ -21,9 +21,6 @@ HEALTHY = Finding("Python", "python", Status.OK, "3.11.7")
 ILL = Finding("Libraries", "placo", Status.PROBLEM, "not installed", 'pip install "placo"')
 
 
-# --- the real environment -----------------------------------------------------------------------
-
-
 def test_the_environment_of_these_tests_is_healthy() -> None:
     findings = doctor.examine()
     # Whether the project itself is installed does not matter for running its tests.
@@ -63,9 +60,6 @@ def test_an_import_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.Monke
     assert "0.2 s" in doctor.probe_imports(["hanging_library"])["hanging_library"].error
 
 
-# --- versions -----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("version", "bounds", "fits"),
     [
@@ -101,9 +95,6 @@ def test_every_library_that_the_project_asks_for_is_known(
 
     monkeypatch.setattr(importlib.metadata, "requires", requires)
     assert set(doctor.requirements_of(PROGRAM)) == set(doctor.parse_requirements(rows)) > {"coal"}
-
-
-# --- illnesses ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -208,9 +199,6 @@ def test_the_system_is_known(system: str, machine: str, status: Status, told: st
     assert told in finding.detail
 
 
-# --- the report ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("findings", "code", "verdict"),
     [
@@ -242,9 +230,6 @@ def test_json_says_the_same_and_lines_to_type_never_wrap(
     text = doctor.render([Finding("A", "b", Status.PROBLEM, "word " * 40, line)])
     assert f"-> {line}" in text
     assert max(len(row) for row in text.splitlines() if "->" not in row) <= 80
-
-
-# --- ROS 2, which is optional -------------------------------------------------------------------
 
 
 def test_without_the_extra_one_note_names_the_line_that_installs_it() -> None:

@@ -65,9 +65,6 @@ class IdealRobot:
         )
 
 
-# --- in the shadow of somebody else -----------------------------------------------------------
-
-
 @pytest.mark.parametrize("leg", range(4))
 @pytest.mark.parametrize("share", [0.3, 1.0])
 def test_the_stride_follows_a_foot_that_comes_down(leg: int, share: float) -> None:
@@ -89,9 +86,6 @@ def test_the_phase_is_that_of_the_front_left_foot() -> None:
     assert reference.stance[1]
     hold(planner, resting(), VelocityCommand(0.3), 0.5 * TROT.period)
     assert min(planner.phase, 1.0 - planner.phase) < 2.0 * TICK / TROT.period
-
-
-# --- standing and starting ------------------------------------------------------------------------
 
 
 def test_before_it_has_started_it_is_not_stepping_and_has_no_heading() -> None:
@@ -150,9 +144,6 @@ def test_squaring_up_steps_unless_the_feet_are_below_the_hips() -> None:
     assert planner.is_stepping
 
 
-# --- the body's path ------------------------------------------------------------------------------
-
-
 def test_the_reference_velocity_ramps_to_the_command_at_the_allowed_rate() -> None:
     """Along a straight line: on the ground all directions are alike."""
     planner, command = started(resting()), VelocityCommand(0.6, -0.3, 1.0)
@@ -206,9 +197,6 @@ def test_a_robot_that_hangs_low_is_asked_for_more_height() -> None:
     low = start.replaced(p_world_com=start.p_world_com - [0.0, 0.0, 0.02])
     reference = hold(started(start), low, ZERO_COMMAND, 0.5)
     assert reference.body.p_world[2] > CONFIG.height + 0.01
-
-
-# --- footholds ------------------------------------------------------------------------------------
 
 
 def landing(snapshot: Snapshot, command: VelocityCommand) -> Reference:
@@ -394,9 +382,6 @@ def test_the_mirrored_robot_is_asked_for_the_mirror_image(seed: int) -> None:
             np.testing.assert_allclose(
                 getattr(image.body, name), getattr(there.body, name), atol=EXACT
             )
-
-
-# --- walking and stopping -------------------------------------------------------------------------
 
 
 def test_diagonals_take_turns_and_swing_feet_are_lifted() -> None:

@@ -106,9 +106,6 @@ def test_the_foot_mesh_is_nearly_a_sphere_of_the_foot_radius() -> None:
         np.testing.assert_allclose(offset, 0.0, atol=3 * MESH_TOLERANCE)
 
 
-# --- descriptions that are no Go2 -----------------------------------------------------------------
-
-
 def test_a_missing_urdf_or_one_that_pinocchio_cannot_read_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DescriptionError, match=r"nowhere\.urdf"):
         RobotModel(find_description(tmp_path / "nowhere.urdf"))

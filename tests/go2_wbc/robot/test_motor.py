@@ -113,9 +113,6 @@ def test_an_unknown_motor_is_refused_with_the_names_that_exist() -> None:
         RobotModel(motor="perfect")
 
 
-# --- in every tick --------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", MOTORS)
 def test_a_plant_is_driven_by_the_servos_torque_cut_to_the_line(name: str) -> None:
     motor, rng = RobotModel(motor=name).motor, np.random.default_rng(31)

@@ -127,8 +127,6 @@ def test_a_dropped_robot_stands_up_on_its_own_sensors(seed: int) -> None:
     plant.close()
 
 
-# --- decision tables ------------------------------------------------------------------------------
-
 C, G, DT = EstimatorConfig(), 9.81, 0.002
 UP = [0.0, 0.0, G]
 CARRYING = 0.5 * G  #: What a trunk feels at least if something carries it

@@ -82,9 +82,6 @@ def watched(*readings: SensorReading) -> tuple[SensorReading, tuple[PartFault, .
     return last, watch.faults
 
 
-# --- what is taken of a leg ---------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("leg", range(4))
 def test_a_legs_motion_and_force_are_pinocchios(leg: int) -> None:
     rng = np.random.default_rng(leg)
@@ -112,9 +109,6 @@ def test_a_foot_that_rolls_has_the_velocity_of_the_point_that_touches() -> None:
         (0.0, 0.8, -1.6), (0.0, 3.0, -1.0), (0.04, 0.0, 0.0), ZERO, (0.0, 0.0, 1.0), 0.02
     )
     assert moved == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
-
-
-# --- readings -----------------------------------------------------------------------------------
 
 
 def test_a_sound_robots_readings_leave_as_they_came() -> None:

@@ -74,9 +74,6 @@ def decision(solution: WbcSolution) -> np.ndarray:
     return np.concatenate([solution.qdd, solution.forces.ravel()])
 
 
-# --- physics --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("backend", "solver"), PAIRS, ids=IDS)
 def test_the_solution_obeys_the_equation_of_motion_with_an_unactuated_base(
     backend: str, solver: str
@@ -86,9 +83,6 @@ def test_the_solution_obeys_the_equation_of_motion_with_an_unactuated_base(
     for (snapshot, reference), solution in zip(random_cases(), found, strict=True):
         assert motion_error(snapshot, solution) < MOTION_TOLERANCE
         assert not solution.forces[~reference.stance].any()
-
-
-# --- optimality -----------------------------------------------------------------------------------
 
 
 def stationarity(problem: Problem, z: np.ndarray) -> float:
@@ -150,16 +144,10 @@ def test_every_kind_of_bound_is_active_somewhere() -> None:
     assert min(kinds.values()) >= 3, kinds
 
 
-# --- agreement ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("backend", "solver"), PAIRS[1:], ids=IDS[1:])
 def test_both_back_ends_and_all_solvers_find_the_same_torques(backend: str, solver: str) -> None:
     for first, other in zip(solved("condensed", "daqp"), solved(backend, solver), strict=True):
         np.testing.assert_allclose(other.tau, first.tau, atol=TORQUE_AGREEMENT, rtol=0)
-
-
-# --- elimination of the equalities ----------------------------------------------------------------
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -187,9 +175,6 @@ def test_nothing_that_meets_the_equalities_is_lost() -> None:
         for leg in LEGS:
             rows = slice(18 + 3 * leg, 21 + 3 * leg) if stance[leg] else leg.velocities
             np.testing.assert_array_equal(Z[rows], np.eye(12)[leg.joints])
-
-
-# --- singular legs --------------------------------------------------------------------------------
 
 
 def with_foot_level_with_its_hip(leg: Leg, offset: float) -> tuple[Snapshot, Reference]:

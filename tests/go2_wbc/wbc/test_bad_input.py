@@ -105,9 +105,6 @@ def expect_refusal(ways: Ways, case: tuple[Snapshot, Reference], message: str) -
                 wbc.solve(*case, relax=relax)
 
 
-# --- numbers that are not finite ------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("value", NOT_FINITE)
 @pytest.mark.parametrize(("owner", "name"), PLACES, ids=[".".join(place) for place in PLACES])
 def test_what_is_not_finite_is_refused_by_name(
@@ -156,9 +153,6 @@ def test_a_target_that_is_no_rotation_is_refused(ways: Ways) -> None:
     expect_refusal(ways, (snapshot, replace(reference, body=body)), "rows of 'body orientation'")
 
 
-# --- shapes ---------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -199,9 +193,6 @@ def test_a_snapshot_of_another_shape_is_refused_by_name() -> None:
         snapshot.replaced(bias=np.zeros(17))
 
 
-# --- bounds of forces -----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("least", "greatest"), [(60.0, 50.0), (-20.0, -5.0), (5.0, -5.0)])
 def test_forces_that_no_ground_can_give_are_refused(
     least: float, greatest: float, ways: Ways
@@ -227,9 +218,6 @@ def test_a_negative_least_force_is_none(ways: Ways) -> None:
     for wbc in ways.values():
         ours, theirs = wbc.solve(snapshot, free), wbc.solve(snapshot, below)
         np.testing.assert_allclose(ours.tau, theirs.tau, atol=ROUNDING, rtol=0)
-
-
-# --- few feet, and none ---------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("legs", [(SW, SW, SW, SW), (JO, JO, JO, JO), (SW, JO, SW, JO)])
@@ -263,8 +251,6 @@ def test_one_foot_on_the_ground_is_answered_alike(stance: int, ways: Ways) -> No
         np.testing.assert_allclose(solution.tau, solutions["compiled"].tau, atol=AGREEMENT, rtol=0)
         assert motion_error(snapshot, solution) < ROUNDING
 
-
-# --- configuration --------------------------------------------------------------------------------
 
 WEIGHT_NAMES = ["position_weight", "orientation_weight", "swing_weight", "posture_weight"]
 LEAST, GREATEST = WEIGHTS
@@ -322,9 +308,6 @@ def test_at_the_ends_of_the_weights_ranges_the_solvers_still_agree(low: int) -> 
         for other in others:
             theirs = other.solve(snapshot, reference).tau
             np.testing.assert_allclose(tau, theirs, atol=CORNER_AGREEMENT, rtol=0)
-
-
-# --- tasks of a user's own ------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("weight", [*NOT_FINITE, -1.0, 2 * GREATEST_EXTRA_WEIGHT])

@@ -50,9 +50,6 @@ def scene(seed: int, legs: tuple = FOUR_FEET) -> tuple:
     return snapshot, random_reference(snapshot, legs, 2.0, rng), z
 
 
-# --- equations of motion --------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("seed", SEEDS)
 def test_base_rows_and_torques_are_the_inverse_dynamics_less_the_contact_forces(seed: int) -> None:
     snapshot, reference, z = scene(seed)
@@ -93,8 +90,6 @@ def test_torque_limits_follow_the_motors_line_at_the_measured_speed(share: float
     np.testing.assert_allclose(value - bounds.lower, tau - lower, atol=EXACT)
     assert ((upper if share > 0 else -lower) < 0.6 * MODEL.torque_limits).all()
 
-
-# --- contact forces -------------------------------------------------------------------------------
 
 SNAPSHOT = MODEL.snapshot(state_of(standing_q()))
 newtons = st.floats(-200.0, 200.0)
@@ -145,8 +140,6 @@ def test_only_planned_forces_are_kept_in_the_cone() -> None:
     other = cone.bounds(SNAPSHOT, planned).C
     assert (np.abs(other - same).reshape(4, 5, 30).max(axis=(1, 2)) > 0.1).all()
 
-
-# --- joint limits ---------------------------------------------------------------------------------
 
 LIMITS = JointLimits(MODEL.q_lower, MODEL.q_upper, MODEL.speed_limits, BRAKING, HORIZON)
 MIDDLE = (MODEL.q_lower + MODEL.q_upper) / 2

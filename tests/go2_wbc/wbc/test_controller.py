@@ -58,9 +58,6 @@ MODEL = RobotModel()
 STAND = standing(MODEL)
 
 
-# --- static stand ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_forces_and_torques_of_a_static_stand_are_its_static_equilibrium(backend: str) -> None:
     """sum f = m g, tau = g - J' f joint by joint, and no moment about the CoM is left."""
@@ -90,9 +87,6 @@ def test_three_feet_carry_the_weight_too(raised: int) -> None:
     np.testing.assert_allclose(solution.forces.sum(axis=0), expected, atol=EXACT)
 
 
-# --- symmetry -------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("backend", ["condensed", "full"])
 def test_the_mirrored_robot_gets_the_mirrored_solution(backend: str) -> None:
     """PlaCo is left out: it loads the URDF itself, whose trunk is not symmetric."""
@@ -108,9 +102,6 @@ def test_the_mirrored_robot_gets_the_mirrored_solution(backend: str) -> None:
         there = controller.solve(image, mirrored_reference(reference))
         np.testing.assert_allclose(there.tau, mirrored_joints(here.tau), atol=MIRRORED)
         np.testing.assert_allclose(there.forces, mirrored_feet(here.forces), atol=MIRRORED)
-
-
-# --- limits under hard demands --------------------------------------------------------------------
 
 
 def pulled(reference: Reference, a_world: list[float]) -> Reference:
@@ -197,9 +188,6 @@ def test_the_joint_margin_moves_limits_inwards_and_a_residual_is_the_largest_err
     assert rows["body position"] == pytest.approx(np.abs(a_com - [50.0, 0.0, 0.0]).max())
 
 
-# --- no solution ----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("backend", ["condensed", "full"])
 @pytest.mark.parametrize(
@@ -241,9 +229,6 @@ def test_an_unknown_back_end_is_answered_with_the_valid_names() -> None:
 def test_an_unknown_solver_is_refused_before_the_first_tick(backend: str) -> None:
     with pytest.raises(SolverUnavailable, match="valid: active_set, daqp, proxqp, quadprog"):
         WholeBodyController(MODEL, backend, WbcConfig(solver="cplex"))
-
-
-# --- the solution ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("backend", BACKENDS)

@@ -75,9 +75,6 @@ def test_a_solver_keeps_no_memory_of_the_last_problem(solver: str) -> None:
     np.testing.assert_array_equal(solve_dense_qp(first, solver), alone)
 
 
-# --- problems without solution --------------------------------------------------------------------
-
-
 def contradiction() -> DenseQp:
     C = np.array([[1.0, 0.0], [1.0, 0.0]])
     return DenseQp(np.eye(2), np.zeros(2), C, np.array([1.0, -np.inf]), np.array([np.inf, -1.0]))
@@ -114,9 +111,6 @@ def test_an_answer_that_is_not_finite_or_breaks_the_bounds_counts_as_none(
     monkeypatch.setattr(qpsolvers, "solve_problem", lambda *_, **__: huge)
     with pytest.raises(QpInfeasible, match="breaks the constraints"):
         solve_dense_qp(random_qp(1, 0), "daqp")
-
-
-# --- names ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

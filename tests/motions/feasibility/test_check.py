@@ -48,9 +48,6 @@ def failed(report: FeasibilityReport) -> set[str]:
     return {finding.check for finding in report.failures}
 
 
-# --- plans broken on purpose ----------------------------------------------------------------------
-
-
 def test_a_good_plan_passes_and_one_that_is_not_a_number_does_not(
     good: CompiledPlan, checker: FeasibilityChecker
 ) -> None:
@@ -156,8 +153,6 @@ def test_causes_come_before_what_follows_from_them(
     assert report.failures[0].time > 1.0 > min(finding.time for finding in report.failures)
 
 
-# --- timelines that the robot cannot do -----------------------------------------------------------
-
 AWAY = {
     "reach": Timeline().body(z=0.18, over=1.0).home(over=1.0),
     "joint position": Timeline().body(z=-0.24, over=1.0).home(over=1.0),
@@ -253,9 +248,6 @@ def test_a_motion_that_ends_elsewhere_is_told_what_ends_it(
     assert str(finding).endswith(f"{way})")
     home = checker.check(Timeline().body(z=-0.03, over=0.5).home(over=0.5))
     assert "home()" not in home.table()
-
-
-# --- what the numbers mean ------------------------------------------------------------------------
 
 
 def test_the_feet_of_a_resting_robot_carry_its_weight_with_the_torques_of_statics(

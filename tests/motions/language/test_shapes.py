@@ -28,9 +28,6 @@ def written(line: Timeline) -> list[str]:
     return sorted(map(str, keys))
 
 
-# --- shapes -------------------------------------------------------------------------------
-
-
 def test_a_path_passes_its_points_evenly_without_a_stop() -> None:
     points = [{"x": 0.02, "z": -0.02}, {"x": 0.03, "z": 0.0}, {"x": 0.0, "z": 0.0}]
     plan = plan_of(Timeline().body_path(points, over=2.4, times=[0.6, 1.2, 2.4]))
@@ -84,9 +81,6 @@ def test_an_own_easing_says_how_far_the_trunk_has_come() -> None:
     for t in (0.2, 0.5, 0.9):
         own, named = (curves_at(plan_of(one), t)[0] for one in (line, same))
         assert own == pytest.approx(named, abs=1e-9)
-
-
-# --- whole motions ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["nod", "wave", "dance", "high_five"])
@@ -208,9 +202,6 @@ def test_backwards_every_foot_steps_to_where_it_came_from(line: Timeline) -> Non
 def test_a_loop_is_as_many_whole_rounds_as_fit() -> None:
     assert NOD.loop(until=5.0).end == pytest.approx(3 * 1.5)
     assert NOD.loop(until=3.0).end == pytest.approx(3.0)
-
-
-# --- what is refused --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

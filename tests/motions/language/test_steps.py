@@ -48,9 +48,6 @@ def played(plan: CompiledPlan) -> tuple[Anchor, np.ndarray]:
     return anchor, (feet - anchor.p_world) @ yaw_rotation(anchor.yaw)
 
 
-# --- single steps ---------------------------------------------------------------------------------
-
-
 def test_a_foot_lands_where_its_step_says_and_is_put_down_where_it_stands_by_then() -> None:
     feet = last_feet(Timeline().step("FL", 0.06, 0.03, over=0.6).home(over=0.8))
     moved = np.array([[0.06, 0.03, 0.0], *np.zeros((3, 3))])
@@ -88,9 +85,6 @@ def test_a_step_may_go_round_the_feet_but_not_out_of_reach() -> None:
     p, turned = NOMINAL[Leg.RR], last_feet(line)[Leg.RR]
     assert np.arctan2(turned[1], turned[0]) - np.arctan2(p[1], p[0]) == pytest.approx(deg(10))
     assert "way of a foot" in failures(Timeline().step("FL", 0.5, over=1.0).home(over=0.8))
-
-
-# --- ways -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("gait", ["walk", "trot"])
@@ -169,9 +163,6 @@ def test_a_walk_takes_its_time_while_the_trunk_sways_and_leans() -> None:
     assert plan_of(line).end_pose == pytest.approx((0.24, 0.0, 0.0), abs=EXACT)
 
 
-# --- the check ------------------------------------------------------------------------------------
-
-
 def test_a_trot_long_on_two_feet_or_off_their_line_is_refused() -> None:
     line = Timeline().walk(0.2, gait="trot")
     assert not failures(line)
@@ -191,9 +182,6 @@ def test_a_motion_that_goes_anywhere_says_where_it_ends_above_its_feet() -> None
     assert "entry and exit" in failures(Timeline().walk(0.1, gait="trot").body(x=0.05, over=0.5))
 
 
-# --- in simulation --------------------------------------------------------------------------------
-
-
 def test_a_robot_ends_a_trot_with_turns_and_a_raised_paw_where_it_was_to_end() -> None:
     line = Timeline().walk(0.3, gait="trot").turn(deg(60), gait="trot")
     line = line.foot("FR", x=0.05, z=0.1, over=0.6).home(over=0.6).side_step(0.1, gait="trot")
@@ -210,8 +198,6 @@ def test_a_robot_walks_with_one_foot_after_the_other() -> None:
     wanted = plan.at(plan.duration).p_world_feet
     assert np.linalg.norm((feet - wanted)[:, :2], axis=1).max() < PLACED
 
-
-# --- what makes no sense --------------------------------------------------------------------------
 
 UP = Timeline().foot("FL", z=0.05, over=0.5)
 

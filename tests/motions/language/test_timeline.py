@@ -25,9 +25,6 @@ EXACT = 1e-9
 NEAR = 1e-6  # m, rad; of a spline through samples, at a sample
 
 
-# --- the cursor -----------------------------------------------------------------------------------
-
-
 def test_calls_follow_each_other_and_at_puts_the_cursor_anywhere() -> None:
     line = Timeline().body(z=-0.05, over=0.8).hold(0.4).home(over=1.0)
     assert [(key.start, key.end) for key in line.keys] == [(0.0, 0.8), (0.8 + 0.4, 2.2)]
@@ -63,9 +60,6 @@ def test_with_a_tempo_the_shift_before_a_raise_ends_on_a_beat(tempo: float, beat
     assert up.start == pytest.approx((1.0 + beats) * beat)
 
 
-# --- joining --------------------------------------------------------------------------------------
-
-
 def test_then_repeats_and_together_move_keys_in_time() -> None:
     nod = Timeline().body(pitch=0.1, over=0.5).home(over=0.5)
     assert nod.repeat(3).end == pytest.approx(3.0)
@@ -91,9 +85,6 @@ def test_a_mirror_image_of_a_mirror_image_is_the_motion_itself() -> None:
         com, mirrored = a.at(float(t)).body.p_world, b.at(float(t)).body.p_world
         assert mirrored == pytest.approx(com * [1.0, -1.0, 1.0], abs=2e-3)
         assert b.at(float(t)).stance.tolist() == a.at(float(t)).stance[[1, 0, 3, 2]].tolist()
-
-
-# --- feet, contacts and balance -------------------------------------------------------------------
 
 
 def test_a_raised_foot_is_a_swing_leg_and_the_trunk_moves_first() -> None:
@@ -172,8 +163,6 @@ def test_postures_join_stand_and_sit() -> None:
     assert value[3:6] == pytest.approx(np.zeros(3), abs=NEAR)
 
 
-# --- what it refuses ------------------------------------------------------------------------------
-
 NOD = Timeline().body(pitch=0.1, over=0.5)
 
 
@@ -239,9 +228,6 @@ def test_what_has_the_wrong_type_is_refused_with_what_would_be_right() -> None:
     assert together == "TimelineError together() takes timelines, got 7"
     assert entry.startswith("TimelineError entry must be one of Posture.LIE, ")
     assert "from motions import Posture" in entry
-
-
-# --- the leg's inverse kinematics -----------------------------------------------------------------
 
 
 @given(st.sampled_from(list(Leg)), st.lists(st.floats(0.05, 0.95), min_size=3, max_size=3))

@@ -168,9 +168,6 @@ def test_a_page_over_the_limit_is_refused(
     assert list(tmp_path.iterdir()) == []
 
 
-# --- with a verdict and a ghost -------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def content(recording: Recording) -> ReplayContent:
     ghost = replace(recording, q=recording.q + 0.001, foot_forces=recording.foot_forces * 0.5)

@@ -349,9 +349,6 @@ def test_a_path_that_is_none_is_refused(stage: Stage, path: str) -> None:
         stage.ask(Api.TRAJECTORY_FOLLOW, path)
 
 
-# --- the pose while walking -----------------------------------------------------------------------
-
-
 def test_a_walking_robot_takes_an_attitude_on_its_way(stage: Stage) -> None:
     # It stopped, stood and leaned.
     stage.robot.mode, stage.robot.can_hold.return_value = Mode.WALKING, True

@@ -25,9 +25,6 @@ SINKING = 3e-3  # m; contacts are soft
 INTEGRATOR_TOLERANCE = 5e-3
 
 
-# --- forces -------------------------------------------------------------------------------------
-
-
 def test_the_forces_on_a_lying_robot_sum_to_its_weight_below_its_feet_and_in_the_air_are_none(
     plant: MujocoPlant,
 ) -> None:
@@ -97,9 +94,6 @@ def test_low_friction_lets_the_feet_slide_and_high_friction_does_not() -> None:
         slid.append(np.linalg.norm(plant.p_world_feet - start, axis=1).max())
     assert slid[0] > 0.1
     assert slid[1] < 0.01
-
-
-# --- pushes -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("at", ["base", "FR_thigh", "RL_foot"])

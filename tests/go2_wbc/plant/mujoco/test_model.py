@@ -35,9 +35,6 @@ TOTAL_MASS = 16.085  # kg, the sum of the URDF's links
 AGREEMENT = 1e-12
 
 
-# --- the built model ----------------------------------------------------------------------------
-
-
 def test_mujoco_and_pinocchio_agree_on_200_random_states(robot: pin.Model) -> None:
     model, rng = ideal_mujoco_model(find_description()), np.random.default_rng(0)
     for _ in range(200):

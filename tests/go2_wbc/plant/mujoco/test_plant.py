@@ -36,9 +36,6 @@ class TestNoisyMujocoPlantContract(PlantContract):
         return MujocoPlant(sensors="noisy", timestep=0.001, control_period=0.004)
 
 
-# --- starting ---------------------------------------------------------------------------------
-
-
 def test_the_robot_starts_lying_still_on_its_belly_and_stays(plant: MujocoPlant) -> None:
     state = plant.read()
     assert state.time == plant.data.time == 0.0
@@ -83,9 +80,6 @@ def test_initial_joint_noise_moves_the_joints_by_the_seed() -> None:
 def test_a_wrong_setting_is_refused_by_name(settings: dict[str, Any], word: str) -> None:
     with pytest.raises(ConfigError, match=word):
         MujocoPlant(**settings)
-
-
-# --- motors -----------------------------------------------------------------------------------
 
 
 def spinning(share: float, motor: str = TORQUE_SPEED) -> tuple[MujocoPlant, np.ndarray]:
@@ -171,9 +165,6 @@ def test_the_motor_law_has_the_documented_terms_on_each_joint(plant: MujocoPlant
         assert velocities[joint] > 0.0
 
 
-# --- conventions --------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_velocities_are_the_derivatives_of_positions_in_pinocchios_conventions(
     plant: MujocoPlant, seed: int
@@ -217,9 +208,6 @@ def test_the_imu_feels_gravity_standing_and_nothing_falling(plant: MujocoPlant) 
     fly(plant, speed=0.0)
     plant.write(JointCommand.torque(np.zeros(12)))
     assert np.abs(plant.imu().accelerometer).max() < 1e-6
-
-
-# --- repeatability ------------------------------------------------------------------------------
 
 
 def history(plant: MujocoPlant, ticks: int = 200) -> list[RobotState]:
@@ -280,9 +268,6 @@ def test_the_truth_is_that_of_this_moment_after_all_that_changes_it() -> None:
     assert same(plant.truth(), lying)
 
 
-# --- noise --------------------------------------------------------------------------------------
-
-
 def test_noise_has_the_configured_size() -> None:
     noise = SensorNoise()
     noisy, ideal = MujocoPlant(sensors="noisy"), MujocoPlant()
@@ -302,9 +287,6 @@ def test_noise_has_the_configured_size() -> None:
     assert np.allclose(found[3:6], noise.gyro, rtol=0.15)
     assert np.allclose(found[6:], noise.joint_velocity, rtol=0.15)
     assert np.allclose(np.std(errors_turn, axis=0), noise.orientation, rtol=0.15)
-
-
-# --- failures -----------------------------------------------------------------------------------
 
 
 def test_physics_that_diverges_is_reported_and_a_restored_plant_works_again(

@@ -26,9 +26,6 @@ CLOSE = 5e-3  # m; other cones, and feet without their own bodies, sink by 2 mm 
 Edit = Callable[[mujoco.MjSpec], None]
 
 
-# --- a user's own model -------------------------------------------------------------------------
-
-
 @pytest.fixture
 def users_mjcf(tmp_path: Path) -> Callable[..., Path]:
     """Writes our model as a user's MJCF, without anything of ours, changed by ``edit``."""
@@ -233,9 +230,6 @@ def test_joint_dynamics_of_a_users_model_are_its_own_unless_asked(
     assert MujocoPlant(path).model.dof_armature[6:] == pytest.approx(0.02)
     asked = MujocoPlant(path, joint_dynamics=JointDynamics.none())
     assert not asked.model.dof_armature.any()
-
-
-# --- a user's model that cannot be driven -------------------------------------------------------
 
 
 def rename_joint(spec: mujoco.MjSpec) -> None:
