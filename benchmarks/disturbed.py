@@ -174,8 +174,5 @@ def make(robot: TrialRobot, watch: Watch, what: str, rng: np.random.Generator) -
         return
 
 
-ROWS = (
-    ("delay", "longest delay of notice", f"<= {NOTICED:g} s"),
-    ("falls", "falls", ""),
-)
+ROWS = (("delay", "longest delay of notice", f"<= {NOTICED:g} s"), ("falls", "falls", ""))
 STUDY = Study("disturbed", {"random calls and pushes": ROWS}, measure_disturbed, seed_factor=50)

@@ -9,16 +9,7 @@ from PIL import Image
 
 from benchmarks import __main__ as benchmarks
 from controller.cli import main as cli
-from tests.pages import (
-    MADE,
-    NOT_RUN,
-    PAGES,
-    ROOT,
-    blocks,
-    command_lines,
-    page,
-    table_rows,
-)
+from tests.pages import MADE, NOT_RUN, PAGES, ROOT, blocks, command_lines, page, table_rows
 
 LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
 ANCHOR = re.compile(r"\]\(([^)#\s]*\.md)?#([^)]+)\)")

@@ -156,10 +156,7 @@ def bisected(
     return math.sqrt(done * failed)
 
 
-ROWS = (
-    (BORDER, "amplitude at which physics fails", ""),
-    (PLAYS, "motions played to find it", ""),
-)
+ROWS = ((BORDER, "amplitude at which physics fails", ""), (PLAYS, "motions played to find it", ""))
 BORDERS = Study("borders", {"border": ROWS}, measure_border, prefix="")
 
 

@@ -27,9 +27,7 @@ def only(monkeypatch: pytest.MonkeyPatch, results_folder: Path) -> Only:
     def install(study: Study) -> None:
         monkeypatch.setattr(behaviour, "run", replace(behaviour.BENCHMARK, studies=(study,)).run)
         monkeypatch.setattr(
-            command,
-            "run_tasks",
-            lambda tasks, _jobs: ((s, seed, s.run(seed)) for s, seed in tasks),
+            command, "run_tasks", lambda tasks, _jobs: ((s, seed, s.run(seed)) for s, seed in tasks)
         )
 
     return install

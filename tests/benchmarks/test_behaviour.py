@@ -11,11 +11,7 @@ from benchmarks.behaviour import StepCheck, failure_of
 from benchmarks.high_five import highest_window, largest_slip, longest_run
 from benchmarks.robots import plant_of
 from controller.demo.steps import DEMO_STEPS, DemoProgress, StepResult
-from controller.sweeps.trials import (
-    Trial,
-    TrialFailed,
-    TrialRobot,
-)
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.legs import LEGS, Leg
 from tests.go2_wbc.plant.helpers import empty_recording
 

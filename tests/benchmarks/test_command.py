@@ -71,10 +71,7 @@ def test_wrong_usage_exits_with_2(argv: list[str], capsys: pytest.CaptureFixture
     ],
 )
 def test_the_exit_code_says_whether_every_metric_passes(
-    only: Only,
-    capsys: pytest.CaptureFixture[str],
-    measure: Measure,
-    code: ExitCode,
+    only: Only, capsys: pytest.CaptureFixture[str], measure: Measure, code: ExitCode
 ) -> None:
     only(fake(measure))
     assert main(["behaviour", "--seeds", "2"]) == code

@@ -96,12 +96,7 @@ def test_a_solved_motion_may_be_as_far_off_as_its_plan_may_be_from_what_was_aske
 
 @pytest.mark.parametrize(
     ("place", "heading", "missed", "arrived"),
-    [
-        (0.04, 0.06, 0, True),
-        (0.06, 0.0, 0, False),
-        (0.0, 0.08, 0, False),
-        (0.0, 0.0, 1, False),
-    ],
+    [(0.04, 0.06, 0, True), (0.06, 0.0, 0, False), (0.0, 0.08, 0, False), (0.0, 0.0, 1, False)],
 )
 def test_a_motion_that_moves_on_has_arrived_near_its_end_with_every_foot_landed(
     place: float, heading: float, missed: int, *, arrived: bool

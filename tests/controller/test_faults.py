@@ -9,10 +9,7 @@ import pytest
 
 from controller import GO2Controller, Mode
 from go2_wbc.config import Config
-from go2_wbc.errors import (
-    ModeError,
-    PlantTimeout,
-)
+from go2_wbc.errors import ModeError, PlantTimeout
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.config import WbcConfig

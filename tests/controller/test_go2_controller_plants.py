@@ -10,14 +10,7 @@ from go2_wbc.errors import ClosedError, PlantError
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.model import JointDynamics, build_spec
 from go2_wbc.robot.description import find_description
-from tests.controller.plants import (
-    HANG_GUARD,
-    PERIOD,
-    StillPlant,
-    WatchedPlant,
-    in_thread,
-    is_limp,
-)
+from tests.controller.plants import HANG_GUARD, PERIOD, StillPlant, WatchedPlant, in_thread, is_limp
 
 
 def test_in_realtime_the_robot_stands_and_walks_while_the_script_waits() -> None:

@@ -54,10 +54,7 @@ def test_ground_that_was_seen_is_a_small_picture() -> None:
 
 def test_what_has_no_page_is_left_to_its_line(checked: CheckedMotion) -> None:
     run = checked.recording()
-    long = Recording(
-        run.time * LONGEST,
-        *(getattr(run, field.name) for field in fields(run)[1:]),
-    )
+    long = Recording(run.time * LONGEST, *(getattr(run, field.name) for field in fields(run)[1:]))
     assert html_of(long) is None
     assert html_of(Timeline()) is None
     assert html_of(5) is None

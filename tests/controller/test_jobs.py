@@ -11,14 +11,7 @@ from controller.jobs import Job, JobServer
 from controller.modes import Aborted, Measurements, Outcome
 from go2_wbc.errors import ModeError
 from go2_wbc.robot.state import RobotState
-from tests.controller.plants import (
-    HANG_GUARD,
-    Clock,
-    failing,
-    in_thread,
-    lying_state,
-    wait_for,
-)
+from tests.controller.plants import HANG_GUARD, Clock, failing, in_thread, lying_state, wait_for
 
 PATIENCE = 0.8
 LOOKS = 5000  #: How often, a millisecond apart, a test looks whether a job is prepared

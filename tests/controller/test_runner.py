@@ -50,10 +50,7 @@ def make_runner(plant: StillPlant, model: RobotModel) -> Iterator[MakeRunner]:
     made: list[Runner] = []
 
     def make(
-        *,
-        realtime: bool,
-        after_tick: Callable[[], None] = lambda: None,
-        plant: StillPlant = plant,
+        *, realtime: bool, after_tick: Callable[[], None] = lambda: None, plant: StillPlant = plant
     ) -> Runner:
         wbc = WholeBodyController(model)
         loop = ControlLoop(plant, model, wbc, Telemetry(model, 1000), SafetyConfig())

@@ -202,8 +202,7 @@ def test_a_gamepad_is_found_read_and_missed_when_it_goes(monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize(
-    ("library", "told"),
-    [(None, "pip install"), (FakePygame(0), "no gamepad is plugged in")],
+    ("library", "told"), [(None, "pip install"), (FakePygame(0), "no gamepad is plugged in")]
 )
 def test_without_a_gamepad_it_says_what_is_missing(
     monkeypatch: pytest.MonkeyPatch, library: object, told: str

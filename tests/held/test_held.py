@@ -23,17 +23,7 @@ from controller.sweeps import read_sweep
 from go2_wbc import GAITS, Recording, RobotModel, WbcConfig, WholeBodyController, load_config
 from go2_wbc.errors import MissingDependency
 from motions import find_motion, load_motion, load_plan, motion_names, save_motion
-from tests.held.make import (
-    PLANS,
-    STORED,
-    commands,
-    face,
-    leaves,
-    nested,
-    numbers,
-    timeline,
-    toml,
-)
+from tests.held.make import PLANS, STORED, commands, face, leaves, nested, numbers, timeline, toml
 
 ROUNDING = 1e-12  #: Of sums that another version may add up in another order [m, rad, N]
 OURS = ("controller", "go2_wbc", "motions", "viz")

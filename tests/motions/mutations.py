@@ -165,10 +165,7 @@ def _is_up(key: LegKey) -> bool:
 
 
 def _one(
-    line: Timeline,
-    kind: type[_KeyType],
-    rng: np.random.Generator,
-    fits: Callable[[_KeyType], bool],
+    line: Timeline, kind: type[_KeyType], rng: np.random.Generator, fits: Callable[[_KeyType], bool]
 ) -> _KeyType:
     """One of the keys that fit; TimelineError if there is none."""
     keys = [key for key in line.in_order(kind) if fits(key)]

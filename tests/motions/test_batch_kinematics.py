@@ -6,12 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rotation_from_rpy, rpy_from_rotation
-from motions.batch_kinematics import (
-    Wanted,
-    angles_of,
-    attitudes,
-    place,
-)
+from motions.batch_kinematics import Wanted, angles_of, attitudes, place
 from motions.plan.balance import nearest
 from motions.postures import standing_feet
 

@@ -92,8 +92,7 @@ def test_a_foot_is_unloaded_before_it_lifts_and_loaded_only_after_it_lands(name:
 
 
 @pytest.mark.parametrize(
-    ("name", "turns"),
-    [("bow_and_turn", 1), ("march", 2), ("patrol", 2), ("pirouette", 2)],
+    ("name", "turns"), [("bow_and_turn", 1), ("march", 2), ("patrol", 2), ("pirouette", 2)]
 )
 def test_an_about_turn_ends_along_the_line_on_which_it_began(name: str, turns: int) -> None:
     plan = library_plan(name)

@@ -6,16 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.mutation.__main__ import (
-    ALIVE,
-    LIMITS,
-    NEAR,
-    PLAIN,
-    ROOT,
-    TIMEOUT,
-    main,
-    package_mutants,
-)
+from tests.mutation.__main__ import ALIVE, LIMITS, NEAR, PLAIN, ROOT, TIMEOUT, main, package_mutants
 from tests.mutation.operators import draw, mutants_of
 
 CODE = """

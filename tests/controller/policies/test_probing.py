@@ -122,9 +122,7 @@ def test_the_probe_names_the_order_of_another_framework(policy: Policy) -> None:
 
 
 @pytest.mark.usefixtures("few")
-def test_a_policy_that_cannot_walk_is_not_called_right_and_nothing_is_named(
-    policy: Policy,
-) -> None:
+def test_a_policy_that_cannot_walk_is_not_called_right_and_nothing_is_named(policy: Policy) -> None:
     folded = Policy("folded", policy.sidecar, lambda _: np.tile([0.0, 4.0, -4.0], 4))
     finding = probe(folded)
     assert not finding

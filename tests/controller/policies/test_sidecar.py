@@ -65,10 +65,7 @@ def _set(table: str, key: str, value: object) -> dict[str, Any]:
         (_set("", "joints", 3), "joints must be a table, got 3"),
         (_set("joints", "order", 3), "must be a list of 12 names"),
         (_set("joints", "order", ["FL_hip"] * 12), "each of 12 joints once.*without FL_thigh"),
-        (
-            _set("joints", "order", ["FL_hipp"]),
-            "unknown name in joints.*did you mean 'FL_hip",
-        ),
+        (_set("joints", "order", ["FL_hipp"]), "unknown name in joints.*did you mean 'FL_hip"),
         (_set("joints", "signs", 2), "joints.signs must be 1 or -1"),
         (_set("joints", "default", [0.0] * 11), "joints.default must be a number, or a list of 12"),
         (_set("joints", "default", float("nan")), "joints.default must be a number"),

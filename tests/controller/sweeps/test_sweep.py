@@ -124,8 +124,7 @@ def test_with_keep_going_a_seed_that_fails_costs_no_other_one_its_row(out: Path)
 
 
 @pytest.mark.parametrize(
-    ("function", "cause"),
-    [(swept.die_on_5, "killed by SIGSEGV"), (swept.exit_on_5, "exit code 9")],
+    ("function", "cause"), [(swept.die_on_5, "killed by SIGSEGV"), (swept.exit_on_5, "exit code 9")]
 )
 def test_a_worker_that_dies_is_told_with_its_cause(
     function: Callable[[int], dict], cause: str, out: Path

@@ -16,14 +16,7 @@ from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.state import JointCommand, RobotState
-from go2_wbc.robot.state_filter import (
-    FEET,
-    FORCE_BIAS,
-    GYRO_BIAS,
-    THETA,
-    VELOCITY,
-    EstimateError,
-)
+from go2_wbc.robot.state_filter import FEET, FORCE_BIAS, GYRO_BIAS, THETA, VELOCITY, EstimateError
 from tests.engine_helpers import STAND_JOINTS
 from tests.engine_helpers import standing_reading as reading
 

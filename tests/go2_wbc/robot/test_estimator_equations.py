@@ -178,10 +178,7 @@ class DocumentedFilter:
             )
             if stands:
                 told.append(
-                    (
-                        lambda y, m=m: (y[2] @ seen.T - ONE) @ x[1] + m - y[1],
-                        factor * variance,
-                    )
+                    (lambda y, m=m: (y[2] @ seen.T - ONE) @ x[1] + m - y[1], factor * variance)
                 )
             if self.age[leg] < 0.0:
                 pressed = self.model.foot_radius - c.compliance * reading.foot_forces[leg]

@@ -157,14 +157,7 @@ def test_a_robot_with_tilted_joints_is_refused() -> None:
 
 @pytest.mark.parametrize(
     "kernel",
-    [
-        rotations_from_rpy,
-        quaternions_from_rpy,
-        solve_legs,
-        centres_of_mass,
-        settle,
-        share_loads,
-    ],
+    [rotations_from_rpy, quaternions_from_rpy, solve_legs, centres_of_mass, settle, share_loads],
 )
 def test_a_control_loop_need_not_wait_for_the_check_of_a_long_motion(
     kernel: Callable[..., None],

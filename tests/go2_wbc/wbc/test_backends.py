@@ -11,11 +11,7 @@ from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import LegTask, Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import Snapshot
-from go2_wbc.wbc.backends import (
-    eliminate_equalities,
-    solve_condensed,
-    solve_full,
-)
+from go2_wbc.wbc.backends import eliminate_equalities, solve_condensed, solve_full
 from go2_wbc.wbc.condensed import SINGULAR_DETERMINANT
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WbcSolution, WholeBodyController

@@ -318,9 +318,7 @@ def test_a_task_of_ones_own_with_such_a_weight_is_refused(weight: float) -> None
 
 @pytest.mark.parametrize("solver", ["active_set", "daqp"])
 @pytest.mark.parametrize(
-    "shape",
-    [((1, 12), (1,)), ((2, SIZE), (1,)), ((1, SIZE), (1, 1)), ((SIZE,), (1,))],
-    ids=str,
+    "shape", [((1, 12), (1,)), ((2, SIZE), (1,)), ((1, SIZE), (1, 1)), ((SIZE,), (1,))], ids=str
 )
 def test_a_task_of_ones_own_with_rows_of_another_shape_is_refused(
     solver: str, shape: tuple[tuple[int, ...], ...]

@@ -70,9 +70,7 @@ def both(config: WbcConfig | None = None) -> tuple[WholeBodyController, WholeBod
 
 
 @pytest.mark.parametrize(
-    "config",
-    [WbcConfig(), SATURATING, ODD_NUMBERS],
-    ids=["default", "saturating", "odd numbers"],
+    "config", [WbcConfig(), SATURATING, ODD_NUMBERS], ids=["default", "saturating", "odd numbers"]
 )
 def test_torques_are_those_of_the_full_problem(config: WbcConfig) -> None:
     count = 0

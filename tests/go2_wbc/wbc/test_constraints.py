@@ -147,9 +147,7 @@ MIDDLE = (MODEL.q_lower + MODEL.q_upper) / 2
 
 def joint_snapshot(q: np.ndarray, v: np.ndarray) -> Snapshot:
     state = replace(
-        SNAPSHOT.state,
-        q=np.concatenate([standing_q()[:7], q]),
-        v=np.concatenate([np.zeros(6), v]),
+        SNAPSHOT.state, q=np.concatenate([standing_q()[:7], q]), v=np.concatenate([np.zeros(6), v])
     )
     return SNAPSHOT.replaced(state=state)
 
@@ -176,9 +174,7 @@ def test_the_bounds_never_contradict_each_other_nor_ask_for_more_than_the_brakin
 
 
 @given(joint_values)
-def test_beyond_a_limit_a_joint_that_rests_or_moves_out_has_to_come_back(
-    speed: np.ndarray,
-) -> None:
+def test_beyond_a_limit_a_joint_that_rests_or_moves_out_has_to_come_back(speed: np.ndarray) -> None:
     out = np.abs(speed) * MODEL.speed_limits
     lower, upper = joint_bounds(MODEL.q_upper + 0.01, out)
     assert (upper < np.maximum(-out / HORIZON, -BRAKING + EXACT)).all()

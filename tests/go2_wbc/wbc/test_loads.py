@@ -31,10 +31,7 @@ def relative_loads(places: np.ndarray, point: np.ndarray, most: np.ndarray) -> n
     return loads
 
 
-@given(
-    st.integers(2, 4),
-    st.lists(st.floats(-0.05, 0.05), min_size=10, max_size=10).map(np.array),
-)
+@given(st.integers(2, 4), st.lists(st.floats(-0.05, 0.05), min_size=10, max_size=10).map(np.array))
 def test_of_all_loads_that_act_at_that_point_the_most_even_are_taken(
     feet: int, off: np.ndarray
 ) -> None:

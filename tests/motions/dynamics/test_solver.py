@@ -12,14 +12,7 @@ from go2_wbc.errors import MissingDependency, PlanNotFound, TimelineError
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
-from motions.dynamics import (
-    DynamicTrajectory,
-    PhaseProblem,
-    Solved,
-    Tolerance,
-    audit,
-    solve,
-)
+from motions.dynamics import DynamicTrajectory, PhaseProblem, Solved, Tolerance, audit, solve
 from motions.dynamics import phases as phase_builders
 from motions.dynamics.plan_audit import PlanLimits
 from motions.dynamics.solver import continued

@@ -230,9 +230,7 @@ def nods(half: float, pitch: float) -> Timeline:
     return line.home(over=0.3)
 
 
-def test_what_the_feet_cannot_give_for_a_moment_is_refused_if_it_is_much(
-    model: RobotModel,
-) -> None:
+def test_what_the_feet_cannot_give_for_a_moment_is_refused_if_it_is_much(model: RobotModel) -> None:
     # The trunk lags by a few millimetres only, but the feet slide: such a nod fell.
     quick = nods(0.1, 0.1)
     (failure,) = FeasibilityChecker(model).check(quick).failures

@@ -16,15 +16,7 @@ from motions import (
     deg,
     suggest,
 )
-from motions.feasibility.suggestions import (
-    AIM,
-    AMPLITUDE,
-    BOTH,
-    HIGHER,
-    LOWER,
-    SHIFT_TIME,
-    TEMPO,
-)
+from motions.feasibility.suggestions import AIM, AMPLITUDE, BOTH, HIGHER, LOWER, SHIFT_TIME, TEMPO
 from motions.language.keys import PhaseKey
 
 CHECKER = FeasibilityChecker()

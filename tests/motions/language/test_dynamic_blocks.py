@@ -100,10 +100,7 @@ def test_a_pounce_is_a_jump_from_a_low_crouch_and_what_follows_counts_from_its_l
         (lambda: Timeline().jump(height=2.0), "a jump's height must be from -0.4 to 0.4, got 2"),
         (lambda: Timeline().jump(height=0.0), "height must be from 0.02 to 0.4, got 0"),
         (lambda: Timeline().jump(height=-0.1), "height must be from 0.02 to 0.4, got -0.1"),
-        (
-            lambda: Timeline().spin_jump(90.0),
-            r"to 3.14 rad, got 90.0: did you mean deg\(90\)",
-        ),
+        (lambda: Timeline().spin_jump(90.0), r"to 3.14 rad, got 90.0: did you mean deg\(90\)"),
         (lambda: Timeline().hop(0), "from 1 to 10, got 0"),
         (lambda: Timeline().hop(True), "from 1 to 10, got True"),
         (lambda: Timeline().hop(3, height=0.2, period=0.3), "the period of hops must be from 0.6"),

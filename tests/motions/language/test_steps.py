@@ -101,9 +101,7 @@ def test_a_step_may_go_round_the_feet_but_not_out_of_reach() -> None:
     ids=["walk", "turn", "side_step", "path", "path with headings", "on the spot"],
 )
 def test_a_way_ends_where_it_says_on_feet_below_their_hips_and_is_feasible(
-    gait: str,
-    write: Callable[[Timeline, str], Timeline],
-    end: tuple[float, float, float | None],
+    gait: str, write: Callable[[Timeline, str], Timeline], end: tuple[float, float, float | None]
 ) -> None:
     line = write(Timeline(), gait)
     x, y, yaw = line.end_pose

@@ -59,9 +59,7 @@ def counted(
     monkeypatch.setattr(module, name, call)
 
 
-def test_the_robot_is_loaded_once_for_all_poses_of_a_model(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_robot_is_loaded_once_for_all_poses_of_a_model(monkeypatch: pytest.MonkeyPatch) -> None:
     counts: Counter[str] = Counter()
     counted(monkeypatch, counts, inverse_kinematics, "load_placo_robot", lambda *_: 1)
     counted(monkeypatch, counts, balance, "solve_pose", lambda *_: 1)

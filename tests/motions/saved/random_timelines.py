@@ -45,11 +45,7 @@ calls: st.SearchStrategy[Call] = st.one_of(
     st.builds(lambda t: lambda line: line.home(over=t), times),
     st.builds(lambda leg, x, t: lambda line: line.step(leg, x, over=t), legs, small, times),
     st.builds(lambda leg, t: lambda line: line.unweight(leg, over=t), legs, times),
-    st.builds(
-        lambda posture, t: lambda line: line.posture(posture, over=t),
-        postures,
-        times,
-    ),
+    st.builds(lambda posture, t: lambda line: line.posture(posture, over=t), postures, times),
     st.builds(lambda beats: lambda line: line.bpm(beats), st.floats(40.0, 200.0)),
     st.builds(
         lambda leg, name, angle, t: lambda line: line.joint(leg, name, angle, over=t),

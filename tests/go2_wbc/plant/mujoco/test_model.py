@@ -12,10 +12,7 @@ from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.model import PAYLOAD_BODY, JointDynamics
-from go2_wbc.plant.terrain import (
-    Boxes,
-    Patch,
-)
+from go2_wbc.plant.terrain import Boxes, Patch
 from go2_wbc.robot.description import find_description, find_profile
 from go2_wbc.robot.state import JointCommand
 from tests.go2_wbc.plant.helpers import STAND
