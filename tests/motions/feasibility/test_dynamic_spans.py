@@ -114,6 +114,27 @@ def test_what_is_broken_in_a_good_plan_is_found(checker: FeasibilityChecker, how
     assert found <= {one.check for one in report.failures}, report.table()
 
 
+@pytest.mark.parametrize(
+    ("name", "where", "what", "check", "subject"),
+    [
+        ("v", (20, 1), 3.0, "steps", "trunk"),
+        ("v", (20, 4), 30.0, "steps", "trunk turning"),
+        ("v", (20, 9), 30.0, "steps", "joints"),
+        ("tau", (9, 5), 30.0, "equations", "FR_calf"),
+        ("forces", (5, 1, 2), -900.0, "ground pulls", "FR"),
+    ],
+)
+def test_what_is_broken_is_found_in_its_row(
+    checker: FeasibilityChecker, name: str, where: tuple[int, ...], what: float, check: str,
+    subject: str,
+) -> None:  # fmt: skip
+    plan = mutated(plan_of("spin_jump", checker), with_more(name, (where, what)))
+    found = next(one for one in checker.check(plan).failures if one.check == check)
+    span = plan.dynamic[0]
+    assert found.time == pytest.approx(span.start + span.trajectory.times[where[0]])
+    assert found.subject == subject
+
+
 @pytest.mark.parametrize(("payload", "is_refused"), [(2.0, False), (4.0, True)])
 def test_what_was_solved_for_another_mass_is_refused(payload: float, is_refused: bool) -> None:
     """With 4 kg on its trunk the robot fell out of this motion, which passed all else."""
