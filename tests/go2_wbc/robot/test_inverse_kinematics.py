@@ -12,7 +12,7 @@ from go2_wbc.errors import IkError
 from go2_wbc.geometry import support_margin
 from go2_wbc.legs import Leg
 from go2_wbc.robot import inverse_kinematics
-from go2_wbc.robot.inverse_kinematics import PoseTargets, solve_pose
+from go2_wbc.robot.inverse_kinematics import PoseTargets, _residuals, solve_pose
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rotation_from_rpy
 
@@ -143,3 +143,29 @@ def test_any_moderate_trunk_pose_is_met_or_refused(
     np.testing.assert_allclose(R, rotation_from_rpy(roll, pitch, yaw), atol=2e-3)
     assert support_margin(FEET[:, :2], com[:2]) >= 0.05 - 1e-4
     assert reserve(q) >= targets.joint_margin - 1e-4
+
+
+@pytest.mark.parametrize(("joint", "moved"), [(16, 0.0), (16, -1.4), (17, 3.8), (18, -1.2)])
+def test_a_pose_misses_each_target_by_what_it_is_off(joint: int, moved: float) -> None:
+    q = START.copy()
+    q[joint] += moved
+    com, feet = MODEL.forward_kinematics(q)
+    shifts = np.array([[0.03, 0.0, 0.04], [0.0] * 3, [0.0, -0.1, 0.0], [1.0, 1.0, 1.0]])
+    rpy, most = (0.1, 0.0, 0.0), 0.05
+    targets = PoseTargets(
+        p_world_feet=feet + shifts, rpy=rpy, height=0.34, raised=Leg.RR, com_margin=0.5
+    )
+    rows = {row.name: (row.norm, row.unit) for row, _ in _residuals(MODEL, targets, START, q)}
+    over = np.array([MODEL.q_lower + most - q[7:], q[7:] - MODEL.q_upper + most]).max()
+    margin = support_margin(targets.polygon, com[:2])
+    assert rows == {
+        "FL_foot": (pytest.approx(0.05), "m"),
+        "FR_foot": (pytest.approx(0.0), "m"),
+        "RL_foot": (pytest.approx(0.1), "m"),
+        "height": (pytest.approx(0.04), "m"),
+        "orientation": (pytest.approx(0.1), "rad"),
+        "raised joints": (pytest.approx(abs(moved)), "rad"),
+        "CoM margin short by": (pytest.approx(0.5 - margin), "m"),
+        "joint limits beyond": (pytest.approx(max(over, 0.0)), "rad"),
+    }
+    assert (over > 0.0) == (moved != 0.0)

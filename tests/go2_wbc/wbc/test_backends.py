@@ -1,5 +1,6 @@
 """The back ends: physics, optimality and agreement on random problems in every contact mode."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
+from go2_wbc.errors import QpInfeasible
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import LegTask, Reference
 from go2_wbc.robot.model import RobotModel
@@ -24,6 +26,7 @@ from tests.engine_helpers import (
     holding_reference,
     motion_error,
     random_state,
+    standing,
     standing_q,
     state_of,
 )
@@ -201,6 +204,24 @@ def test_a_singular_stance_leg_is_solved_in_full(leg: Leg) -> None:
     lifted = tuple(LegTask.JOINTS if one is leg else LegTask.STANCE for one in LEGS)
     problem = controller().formulate(snapshot, replace(reference, legs=lifted))
     assert eliminate_equalities(problem) is not None
+
+
+@pytest.mark.parametrize("solve", [solve_condensed, solve_full])
+def test_what_cannot_be_is_told_with_the_residuals_of_the_best_without_bounds(
+    solve: Callable[[Problem, str], np.ndarray],
+) -> None:
+    snapshot, reference = standing(model())
+    least, most = np.full(4, 60.0), np.full(4, 9.0)
+    broken = replace(reference, normal_force_min=least, normal_force_max=most)
+    problem = controller().formulate(snapshot, broken)
+    A, E, w = problem.tasks.A, problem.equalities.A, problem.weights
+    K = np.block([[A.T @ (w[:, None] * A), E.T], [E, np.zeros((len(E), len(E)))]])
+    right = np.concatenate([A.T @ (w * problem.tasks.b), problem.equalities.b])
+    best = problem.residuals(np.linalg.lstsq(K, right, rcond=None)[0][: A.shape[1]])
+    with pytest.raises(QpInfeasible) as caught:
+        solve(problem, "daqp")
+    for ours, theirs in zip(caught.value.residuals, best, strict=True):
+        assert ours.norm == pytest.approx(theirs.norm, abs=1e-3), ours
 
 
 @pytest.mark.parametrize("leg", LEGS)

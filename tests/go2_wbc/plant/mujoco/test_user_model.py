@@ -24,10 +24,11 @@ EXPORT_TOLERANCE = 1e-3
 CLOSE = 5e-3  # m; other cones, and feet without their own bodies, sink by 2 mm less
 
 Edit = Callable[[mujoco.MjSpec], None]
+Mjcf = Callable[..., Path]
 
 
 @pytest.fixture
-def users_mjcf(tmp_path: Path) -> Callable[..., Path]:
+def users_mjcf(tmp_path: Path) -> Mjcf:
     """Writes our model as a user's MJCF, without anything of ours, changed by ``edit``."""
 
     def write(edit: Edit = lambda _spec: None) -> Path:
@@ -49,7 +50,7 @@ def delete_actuators(spec: mujoco.MjSpec) -> None:
         spec.delete(actuator)
 
 
-def test_a_users_model_behaves_like_the_built_one(users_mjcf: Callable[..., Path]) -> None:
+def test_a_users_model_behaves_like_the_built_one(users_mjcf: Mjcf) -> None:
     user, built = MujocoPlant(users_mjcf()), MujocoPlant()
     assert user.total_mass == pytest.approx(TOTAL_MASS, abs=1e-4)
     assert np.abs(stand_up(user).q - stand_up(built).q)[2:].max() < EXPORT_TOLERANCE
@@ -57,9 +58,7 @@ def test_a_users_model_behaves_like_the_built_one(users_mjcf: Callable[..., Path
     assert user.imu().accelerometer == pytest.approx(built.imu().accelerometer, abs=0.1)
 
 
-def test_what_is_drawn_of_a_users_model_moves_with_its_joints(
-    users_mjcf: Callable[..., Path],
-) -> None:
+def test_what_is_drawn_of_a_users_model_moves_with_its_joints(users_mjcf: Mjcf) -> None:
     def edit(spec: mujoco.MjSpec) -> None:
         cube = {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": [0.01] * 3, "mass": 0.0}
         for body in spec.bodies:
@@ -87,9 +86,7 @@ def test_an_export_that_has_our_sensors_is_accepted(tmp_path: Path) -> None:
     assert MujocoPlant(path).read().tilt < 0.2
 
 
-def test_motors_and_floor_are_added_and_the_tighter_motor_limit_wins(
-    users_mjcf: Callable[..., Path],
-) -> None:
+def test_motors_and_floor_are_added_and_the_tighter_motor_limit_wins(users_mjcf: Mjcf) -> None:
     def edit(spec: mujoco.MjSpec) -> None:
         delete_actuators(spec)
         spec.delete(spec.geom(FLOOR))
@@ -108,9 +105,7 @@ def test_motors_and_floor_are_added_and_the_tighter_motor_limit_wins(
     assert limits[3] == 23.7
 
 
-def test_motors_in_another_order_still_drive_their_own_joints(
-    users_mjcf: Callable[..., Path],
-) -> None:
+def test_motors_in_another_order_still_drive_their_own_joints(users_mjcf: Mjcf) -> None:
     def edit(spec: mujoco.MjSpec) -> None:
         delete_actuators(spec)
         for name in sorted(JOINT_NAMES, reverse=True):
@@ -126,9 +121,7 @@ def test_motors_in_another_order_still_drive_their_own_joints(
         assert np.argmax(np.abs(plant.read().joint_velocities)) == joint
 
 
-def test_what_stands_before_the_robot_in_the_file_can_be_pushed_too(
-    users_mjcf: Callable[..., Path],
-) -> None:
+def test_what_stands_before_the_robot_in_the_file_can_be_pushed_too(users_mjcf: Mjcf) -> None:
     path = users_mjcf()
     crate = '<body name="crate" pos="2 0 0.1"><freejoint/><geom size=".1" mass="1"/></body>'
     text = path.read_text(encoding="utf-8").replace("<worldbody>", f"<worldbody>{crate}", 1)
@@ -140,9 +133,7 @@ def test_what_stands_before_the_robot_in_the_file_can_be_pushed_too(
     assert plant.data.body("crate").cvel[4] > 1.0  # m/s
 
 
-def test_a_servo_that_drives_no_leg_is_the_users_own_affair(
-    users_mjcf: Callable[..., Path],
-) -> None:
+def test_a_servo_that_drives_no_leg_is_the_users_own_affair(users_mjcf: Mjcf) -> None:
     def edit(spec: mujoco.MjSpec) -> None:
         arm = spec.body("base").add_body(name="arm", pos=[0.0, 0.0, 0.1])
         arm.add_joint(name="arm_joint", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0])
@@ -183,7 +174,7 @@ def with_a_ball(spec: mujoco.MjSpec) -> None:
 
 @pytest.mark.parametrize("edit", [feet_on_the_calves, with_pyramids, with_a_ball])
 def test_the_feet_carry_the_weight_wherever_they_are_in_whatever_scene(
-    users_mjcf: Callable[..., Path], edit: Edit
+    users_mjcf: Mjcf, edit: Edit
 ) -> None:
     plant = MujocoPlant(users_mjcf(edit))
     height = stand_up(plant).q[2]
@@ -193,7 +184,7 @@ def test_the_feet_carry_the_weight_wherever_they_are_in_whatever_scene(
 
 
 def test_a_push_at_a_foot_without_a_body_acts_at_the_foot_not_at_the_calfs_centre(
-    users_mjcf: Callable[..., Path],
+    users_mjcf: Mjcf,
 ) -> None:
     plant = MujocoPlant(users_mjcf(feet_on_the_calves))
     urdf = str(find_description().urdf_path)
@@ -207,7 +198,7 @@ def test_a_push_at_a_foot_without_a_body_acts_at_the_foot_not_at_the_calfs_centr
     assert gained == pytest.approx(np.cross(arm, force) * plant.control_period, rel=0.01, abs=1e-5)
 
 
-def test_friction_of_a_users_model_is_its_own_unless_asked(users_mjcf: Callable[..., Path]) -> None:
+def test_friction_of_a_users_model_is_its_own_unless_asked(users_mjcf: Mjcf) -> None:
     def edit(spec: mujoco.MjSpec) -> None:
         for geom in spec.geoms:
             geom.friction = [0.33, 0.005, 0.0001]
@@ -219,9 +210,7 @@ def test_friction_of_a_users_model_is_its_own_unless_asked(users_mjcf: Callable[
         assert plant.data.contact.friction[:, 0] == pytest.approx(expected)
 
 
-def test_joint_dynamics_of_a_users_model_are_its_own_unless_asked(
-    users_mjcf: Callable[..., Path],
-) -> None:
+def test_joint_dynamics_of_a_users_model_are_its_own_unless_asked(users_mjcf: Mjcf) -> None:
     def edit(spec: mujoco.MjSpec) -> None:
         for name in JOINT_NAMES:
             spec.joint(name).armature = 0.02
@@ -298,16 +287,14 @@ FAULTS: list[tuple[Edit, str]] = [
 
 
 @pytest.mark.parametrize(("edit", "message"), FAULTS)
-def test_each_fault_of_a_users_model_is_named(
-    users_mjcf: Callable[..., Path], edit: Edit, message: str
-) -> None:
+def test_each_fault_of_a_users_model_is_named(users_mjcf: Mjcf, edit: Edit, message: str) -> None:
     with pytest.raises(ModelMismatch) as caught:
         MujocoPlant(users_mjcf(edit))
     assert message in str(caught.value)
     assert str(caught.value).count("\n  - ") == 1
 
 
-def test_all_faults_are_named_at_once(users_mjcf: Callable[..., Path]) -> None:
+def test_all_faults_are_named_at_once(users_mjcf: Mjcf) -> None:
     chosen = [FAULTS[i] for i in (0, 1, 3, 4, 6)]
 
     def edit(spec: mujoco.MjSpec) -> None:
@@ -320,7 +307,7 @@ def test_all_faults_are_named_at_once(users_mjcf: Callable[..., Path]) -> None:
 
 
 def test_a_file_that_is_missing_or_comes_with_terrain_is_refused(
-    tmp_path: Path, users_mjcf: Callable[..., Path]
+    tmp_path: Path, users_mjcf: Mjcf
 ) -> None:
     with pytest.raises(ModelMismatch, match=r"nothing\.xml: no such file"):
         MujocoPlant(tmp_path / "nothing.xml")
@@ -336,9 +323,7 @@ def test_a_broken_file_is_refused_with_the_reason(tmp_path: Path, text: str) -> 
         MujocoPlant(path)
 
 
-def test_a_model_that_does_not_compile_is_refused_with_the_reason(
-    users_mjcf: Callable[..., Path],
-) -> None:
+def test_a_model_that_does_not_compile_is_refused_with_the_reason(users_mjcf: Mjcf) -> None:
     path = users_mjcf()
     text = path.read_text(encoding="utf-8").replace("base_convex.stl", "gone.stl")
     path.write_text(text, encoding="utf-8")
