@@ -1,7 +1,5 @@
 """The ground that the page chooses: what is drawn is what the robot is played on."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Files in many habits are edited in place: what is said to be editable is, and nothing else."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

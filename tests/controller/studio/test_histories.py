@@ -3,8 +3,6 @@
 ``GO2_WBC_HISTORIES=500 pytest tests/controller/studio/test_histories.py`` draws as many.
 """
 
-from __future__ import annotations
-
 import ast
 import os
 

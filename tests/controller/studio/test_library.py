@@ -1,7 +1,5 @@
 """A motion of the library is played behind a call, as an author would write it."""
 
-from __future__ import annotations
-
 import base64
 import io
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A file is written only as it is known, and everything can be undone."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Loops are written out and numbers become parameters: the same motion, in one span of the text."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Edits of a file touch only their span; what cannot be edited says why."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Callable, Iterator
 from pathlib import Path

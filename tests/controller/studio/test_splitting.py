@@ -1,7 +1,5 @@
 """A call is split at an instant: the two play as long, and where one was on its way is written."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Several calls, or several arguments, are edited in one step."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Sequence
 

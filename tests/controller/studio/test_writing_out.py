@@ -1,7 +1,5 @@
 """What is computed is written out: the same motion, by calls that can all be edited in place."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The replay page: small, self-contained, each mesh once, and a scene tree that moves right."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections import Counter

@@ -1,7 +1,5 @@
 """The world that a motion is checked in is chosen on the page; the file is not touched."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
