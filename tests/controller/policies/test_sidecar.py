@@ -89,23 +89,16 @@ def test_what_is_wrong_is_named(changed: dict[str, Any], said: str) -> None:
         parse(changed)
 
 
-@pytest.mark.parametrize(
-    ("table", "key", "ends"),
-    [
-        ("", "rate", (10.0, 500.0)),
-        ("action", "clip", (0.0, 1e300)),
-        ("action", "kp", (0.0, 1e300)),
-        ("commands", "lateral", ([0.0, 1.0], [-1.0, 0.0])),
+def test_the_least_and_the_greatest_are_allowed() -> None:
+    clocks = [[{"name": "clock", "frequency": frequency}] for frequency in (0.1, 20.0)]
+    for table, key, ends in (
+        *(("", "rate", (10.0, 500.0)), ("action", "kp", (0.0, 1e300))),
+        *((table, "clip", (0.0, 1e300)) for table in ("action", "observation")),
+        *(("commands", "lateral", ([0.0, 1.0], [-1.0, 0.0])), ("observation", "terms", clocks)),
         ("observation", "history", (1, 100)),
-        ("observation", "clip", (0.0, 1e300)),
-        ("observation", "terms", [[{"name": "clock", "frequency": f}] for f in (0.1, 20.0)]),
-    ],
-)
-def test_the_least_and_the_greatest_are_allowed(
-    table: str, key: str, ends: tuple[object, object]
-) -> None:
-    for end in ends:
-        parse(_set(table, key, end))
+    ):
+        for end in ends:
+            parse(_set(table, key, end))
 
 
 def test_a_file_that_is_none_is_refused_by_its_name(tmp_path: Path) -> None:

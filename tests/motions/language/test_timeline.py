@@ -1,6 +1,7 @@
 """The authoring language: cursor, tracks, joining, mirror images, and what it refuses."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -208,6 +209,13 @@ def test_what_is_written_wrongly_is_refused_with_what_would_be_right(
 ) -> None:
     with pytest.raises(TimelineError, match=message):
         write()
+
+
+def test_what_moves_twice_at_once_is_refused_also_in_a_copy() -> None:
+    line = replace(Timeline().body(z=-0.02, over=0.3).body(pitch=0.1, over=1.0))
+    with pytest.raises(TimelineError, match="body pitch moves twice at once"):
+        line.at(0.6).body(pitch=0.2, over=0.5)
+    assert line.at(1.3).body(pitch=0.2, over=0.5).end == pytest.approx(1.8)
 
 
 WRONG_TYPES = """
