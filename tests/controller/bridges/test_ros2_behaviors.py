@@ -5,7 +5,7 @@ import math
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -33,12 +33,6 @@ from tests.controller.fake_go2 import FakeGo2
 from tests.controller.plants import PERIOD, WatchedPlant
 
 HANG_GUARD = 30.0
-
-
-@pytest.fixture
-def go2() -> Iterator[GO2Controller]:
-    with GO2Controller(plant=WatchedPlant()) as go2:
-        yield go2
 
 
 def jobs_of(go2: GO2Controller) -> Jobs:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -16,7 +16,6 @@ from controller.jobs import JobServer
 from controller.modes import Mode, Outcome
 from go2_wbc.errors import CommandError, MotionFileError, MotionInfeasible
 from motions import FeasibilityChecker, Timeline, load_motion, load_plan, save_motion, save_plan
-from tests.controller.plants import WatchedPlant
 
 SAVED = ("broken.plan", "dip.json", "dip.plan", "high.json")
 
@@ -37,12 +36,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (own / "broken.plan").write_bytes(b"\x80")
     (own / "dip.py").write_text("raise SystemExit", encoding="utf-8")
     return own
-
-
-@pytest.fixture
-def go2() -> Iterator[GO2Controller]:
-    with GO2Controller(plant=WatchedPlant()) as go2:
-        yield go2
 
 
 def _played(go2: GO2Controller, name: str, folder: Path, settings: Sequence[str] = ()) -> Outcome:
