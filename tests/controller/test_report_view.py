@@ -9,19 +9,20 @@ from controller.report_view import parts_of, performed, planned, verdict_of
 from go2_wbc.errors import PlantError
 from go2_wbc.recording import Recording
 from go2_wbc.robot.rotations import yaw_rotation
-from motions import CheckedMotion, FeasibilityChecker, Timeline
+from motions import CheckedMotion, Timeline
+from motions import FeasibilityChecker as Checker
 
 _YAW, _PLACE = 1.1, np.array([0.7, -0.4, 0.0])
 _ROUNDING = 1e-9
 
 
 @pytest.fixture(scope="module")
-def nod(checker: FeasibilityChecker) -> CheckedMotion:
+def nod(checker: Checker) -> CheckedMotion:
     return checker.evaluate(Timeline(name="nod").body(pitch=0.1, over=0.6).home(over=0.6))
 
 
 @pytest.fixture(scope="module")
-def stretched(checker: FeasibilityChecker) -> CheckedMotion:
+def stretched(checker: Checker) -> CheckedMotion:
     line = Timeline(name="up").body(z=0.17, over=1.0).hold(0.5).home(over=1.0)
     return checker.evaluate(line)
 
@@ -79,7 +80,7 @@ def test_a_subject_has_its_parts(subject: str, parts: tuple[str, ...]) -> None:
 
 
 def test_a_run_is_seen_in_the_frame_and_at_the_time_of_its_motion(
-    nod: CheckedMotion, checker: FeasibilityChecker
+    nod: CheckedMotion, checker: Checker
 ) -> None:
     plan = nod.recording()
     run = _elsewhere(plan)
@@ -100,9 +101,7 @@ def test_a_run_is_seen_in_the_frame_and_at_the_time_of_its_motion(
     assert own.labels[-1] == "afterwards"
 
 
-def test_a_run_without_the_motion_is_refused(
-    nod: CheckedMotion, checker: FeasibilityChecker
-) -> None:
+def test_a_run_without_the_motion_is_refused(nod: CheckedMotion, checker: Checker) -> None:
     run = _elsewhere(nod.recording())
     with pytest.raises(PlantError, match="no motion 'nod'"):
         performed(nod, replace(run, labels=("stand",) * len(run.labels)), checker.model)
@@ -133,7 +132,7 @@ def _elsewhere(plan: Recording, name: str = "nod") -> Recording:
 
 
 def test_the_page_shows_what_was_written_beside_the_nearest_feasible(
-    checker: FeasibilityChecker,
+    checker: Checker,
 ) -> None:
     line = Timeline(name="sway", physics="nearest")
     for side in (1.0, -1.0, 1.0):
@@ -156,7 +155,7 @@ def test_the_page_shows_what_was_written_beside_the_nearest_feasible(
 
 
 def test_the_page_shows_the_beats_and_the_end_of_a_motion_that_moves_on(
-    checker: FeasibilityChecker,
+    checker: Checker,
 ) -> None:
     line = Timeline(name="on").bpm(120).body(z=-0.01, over=2).home(over=2)
     still = planned(checker.evaluate(line))

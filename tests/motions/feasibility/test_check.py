@@ -15,12 +15,14 @@ from go2_wbc.world import World
 from motions import (
     CheckedMotion,
     CompiledPlan,
-    FeasibilityChecker,
     Timeline,
     check,
     compile_timeline,
     deg,
     load_motion,
+)
+from motions import (
+    FeasibilityChecker as Checker,
 )
 from motions.feasibility import FeasibilityReport
 from motions.feasibility.forces import CREEP, DRY, VISCOUS, forces_of, resisted, state_at
@@ -49,7 +51,7 @@ def failed(report: FeasibilityReport) -> set[str]:
 
 
 def test_a_good_plan_passes_and_one_that_is_not_a_number_does_not(
-    good: CompiledPlan, checker: FeasibilityChecker
+    good: CompiledPlan, checker: Checker
 ) -> None:
     report = checker.check(good)
     assert report.ok, report.table()
@@ -60,7 +62,7 @@ def test_a_good_plan_passes_and_one_that_is_not_a_number_does_not(
 
 
 def test_a_joint_beyond_its_limit_is_found_at_its_worst_instant(
-    good: CompiledPlan, checker: FeasibilityChecker, model: RobotModel
+    good: CompiledPlan, checker: Checker, model: RobotModel
 ) -> None:
     report = checker.check(with_joint_beyond_its_limit(good))
     (finding,) = [f for f in report.failures if f.check == "joint position"]
@@ -77,7 +79,7 @@ def test_a_joint_beyond_its_limit_is_found_at_its_worst_instant(
     assert caught.value.findings == report.failures
 
 
-def test_a_joint_that_is_too_fast_is_found(good: CompiledPlan, checker: FeasibilityChecker) -> None:
+def test_a_joint_that_is_too_fast_is_found(good: CompiledPlan, checker: Checker) -> None:
     report = checker.check(with_joint_too_fast(good))
     (finding,) = [f for f in report.failures if f.check == "joint speed"]
     assert finding.subject == "FR_thigh"
@@ -88,7 +90,7 @@ def test_a_joint_that_is_too_fast_is_found(good: CompiledPlan, checker: Feasibil
 
 @pytest.mark.parametrize("aside", [0.3, -0.3])
 def test_a_com_outside_the_support_is_found(
-    good: CompiledPlan, checker: FeasibilityChecker, aside: float
+    good: CompiledPlan, checker: Checker, aside: float
 ) -> None:
     report = checker.check(with_body_aside(good, aside))
     (finding,) = [f for f in report.failures if f.check == "support"]
@@ -98,7 +100,7 @@ def test_a_com_outside_the_support_is_found(
 
 
 def test_a_com_off_the_triangle_is_found_only_while_a_paw_is_up(
-    good: CompiledPlan, checker: FeasibilityChecker
+    good: CompiledPlan, checker: Checker
 ) -> None:
     report = checker.check(with_body_aside(good, -0.095))
     (finding,) = [f for f in report.failures if f.check == "support"]
@@ -129,9 +131,7 @@ def rank(check: str) -> int:
     return next(place for place, checks in enumerate(CAUSES) if check in checks)
 
 
-def test_causes_come_before_what_follows_from_them(
-    good: CompiledPlan, checker: FeasibilityChecker
-) -> None:
+def test_causes_come_before_what_follows_from_them(good: CompiledPlan, checker: Checker) -> None:
     late = Timeline().body(z=-0.02, over=0.1, ease="hold").home(over=1.0).hold(1.0)
     late = late.body(z=0.18, over=1.0).home(over=1.0)
     for motion in (with_body_aside(good, 0.3), with_joint_too_fast(good), late):
@@ -184,15 +184,13 @@ AWAY = {
 
 
 @pytest.mark.parametrize("check", AWAY)
-def test_what_the_robot_cannot_do_is_found_under_its_name(
-    checker: FeasibilityChecker, check: str
-) -> None:
+def test_what_the_robot_cannot_do_is_found_under_its_name(checker: Checker, check: str) -> None:
     report = checker.check(AWAY[check])
     assert check in failed(report), report.table()
 
 
 def test_a_foot_that_moves_along_the_ground_is_found_and_one_that_rises_on_its_way_is_not(
-    checker: FeasibilityChecker,
+    checker: Checker,
 ) -> None:
     line = Timeline().foot("FR", x=0.05, z=0.0, over=0.6).home(over=0.6)
     (finding,) = checker.check(line).warnings
@@ -211,7 +209,7 @@ def test_a_foot_that_moves_along_the_ground_is_found_and_one_that_rises_on_its_w
 
 
 def test_legs_that_cross_or_end_elsewhere_are_found_and_no_balance_has_no_number(
-    checker: FeasibilityChecker,
+    checker: Checker,
 ) -> None:
     crossing = (
         Timeline().foot("FR", z=0.10, over=0.8).foot("FR", y=0.26, z=0.04, over=0.8).home(over=1.0)
@@ -231,18 +229,18 @@ def test_legs_that_cross_or_end_elsewhere_are_found_and_no_balance_has_no_number
         assert "entry and exit" in failed(checker.check(line))
 
 
-def test_a_name_of_the_library_may_be_checked_and_nothing_else(checker: FeasibilityChecker) -> None:
+def test_a_name_of_the_library_may_be_checked_and_nothing_else(checker: Checker) -> None:
     assert checker.check("bow").motion == "bow"
     with pytest.raises(CommandError, match="unknown motion 'bows'; valid: beckon, bow"):
         checker.check("bows")
-    for ask in (FeasibilityChecker.check, FeasibilityChecker.evaluate, FeasibilityChecker.plan):
+    for ask in (Checker.check, Checker.evaluate, Checker.plan):
         with pytest.raises(CommandError, match=r"motion must be a name of the library.* got 3"):
             inspect.unwrap(ask)(checker, 3)  # past the checks of types
 
 
 @pytest.mark.parametrize(("exit", "way"), [(Posture.STAND, "home()"), (Posture.SIT, "'sit')")])
 def test_a_motion_that_ends_elsewhere_is_told_what_ends_it(
-    checker: FeasibilityChecker, exit: Posture, way: str
+    checker: Checker, exit: Posture, way: str
 ) -> None:
     (finding,) = checker.check(Timeline(exit=exit).body(z=-0.03, over=0.5)).failures[:1]
     assert str(finding).endswith(f"{way})")
@@ -288,7 +286,7 @@ def test_a_trajectory_is_where_the_plan_wants_it_and_obeys_the_equations_of_moti
 
 
 def test_a_table_fits_80_columns_and_names_every_check(
-    good: CompiledPlan, checker: FeasibilityChecker
+    good: CompiledPlan, checker: Checker
 ) -> None:
     report = checker.check(good)
     lines = report.table().splitlines()
@@ -306,18 +304,16 @@ _UNLOADED = 1e-3  #: [N] Solver's tolerance at a bound
 
 
 @pytest.fixture(scope="module")
-def high_five(checker: FeasibilityChecker) -> CheckedMotion:
+def high_five(checker: Checker) -> CheckedMotion:
     return checker.evaluate(load_motion("high_five"))
 
 
-def test_it_has_the_report_that_check_gives(
-    checker: FeasibilityChecker, high_five: CheckedMotion
-) -> None:
+def test_it_has_the_report_that_check_gives(checker: Checker, high_five: CheckedMotion) -> None:
     assert high_five.report.as_dict() == checker.check("high_five").as_dict()
 
 
 def test_at_rest_forces_carry_the_weight_and_the_com_keeps_its_margin_over_the_feet(
-    checker: FeasibilityChecker, high_five: CheckedMotion
+    checker: Checker, high_five: CheckedMotion
 ) -> None:
     run = high_five.recording()
     weight = checker.model.mass * checker.model.gravity
@@ -339,7 +335,7 @@ def test_labels_are_the_names_of_holds_or_the_feet_in_the_air(high_five: Checked
     assert set(high_five.recording().labels) == {"on four feet", "FR up", "held"}
 
 
-def test_two_raised_feet_have_no_margin(checker: FeasibilityChecker) -> None:
+def test_two_raised_feet_have_no_margin(checker: Checker) -> None:
     line = Timeline(balance=False).foot("FR", z=0.05, over=0.4).foot("RL", z=0.05, over=0.4)
     run = checker.evaluate(line.home(over=0.5)).recording()
     both = np.array([label == "FR and RL up" for label in run.labels])
@@ -355,12 +351,12 @@ def test_feet_carry_a_payload_too_that_moves_the_centre_of_mass_over_them(
     model: RobotModel,
 ) -> None:
     world = World(payload=3.0, mass_scale=1.05)
-    checked = FeasibilityChecker(model, world=world).evaluate(SWAY)
+    checked = Checker(model, world=world).evaluate(SWAY)
     weight = (1.05 * model.mass + 3.0) * model.gravity
     assert checked.forces.contact[0, :, 2].sum() == pytest.approx(weight, abs=0.05)
     line = Timeline().foot("FR", z=0.06, over=0.6).hold(0.2).home(over=0.6)
     margins = [
-        FeasibilityChecker(model, world=world).check(line).margins["support"].value
+        Checker(model, world=world).check(line).margins["support"].value
         for world in (World(), World(payload=4.0, payload_place=(0.2, 0.0, 0.0)))
     ]
     # The CoM comes forward by 4 / 20.1 of 0.2 m, less what it lies ahead of the payload's place.
@@ -369,18 +365,15 @@ def test_feet_carry_a_payload_too_that_moves_the_centre_of_mass_over_them(
 
 def test_what_is_uncertain_of_mass_and_floor_counts_at_its_worst(model: RobotModel) -> None:
     worlds = (World(), World(mass_uncertainty=0.2), World(mass_scale=1.2))
-    torques = [
-        FeasibilityChecker(model, world=world).check(SWAY).margins["torque"].value
-        for world in worlds
-    ]
+    torques = [Checker(model, world=world).check(SWAY).margins["torque"].value for world in worlds]
     assert torques[0] < torques[1] == pytest.approx(torques[2], rel=1e-9)
     world = World(friction=0.5, friction_uncertainty=0.2)
-    margin = FeasibilityChecker(model, world=world).check(SWAY).margins["friction"]
+    margin = Checker(model, world=world).check(SWAY).margins["friction"]
     assert margin.limit == pytest.approx(0.4)
 
 
 def test_joint_friction_asks_more_of_the_motors(model: RobotModel) -> None:
-    path = FeasibilityChecker(model).evaluate(SWAY).path
+    path = Checker(model).evaluate(SWAY).path
     forces = forces_of(path, model)
     more = resisted(forces, path, World(joint_friction=2.0)).tau - forces.tau
     v = path.v[:, 6:]
@@ -424,7 +417,7 @@ def test_the_table_is_narrow_in_every_world_and_says_what_no_limit_counts_with()
 def test_a_load_that_brings_the_com_inside_does_not_help_a_controller_that_feels_it() -> None:
     # The robot shifts the CoM back to where it is without the load, and fell (MuJoCo, 5 of 5).
     line = Timeline(balance=False).foot("FR", z=0.05, over=0.8).home(over=1.0)
-    without = FeasibilityChecker().check(line).margins["support"]
+    without = Checker().check(line).margins["support"]
     assert without.margin < 0.0
     world = World(payload=4.0, payload_place=(-0.08, 0.04, 0.05))
-    assert FeasibilityChecker(world=world).check(line).margins["support"].value <= without.value
+    assert Checker(world=world).check(line).margins["support"].value <= without.value

@@ -20,7 +20,8 @@ from go2_wbc.wbc import trajectory_loads as loads
 from go2_wbc.wbc.constraints import friction_pyramid
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 from go2_wbc.wbc.trajectory_loads import lag, least_friction, slide
-from motions import FeasibilityChecker, Timeline, compile_timeline, deg
+from motions import FeasibilityChecker as Checker
+from motions import Timeline, compile_timeline, deg
 from motions.batch_kinematics import configurations, zero_moment_points
 from motions.feasibility.forces import (
     CONTACT_RATE,
@@ -93,7 +94,7 @@ def test_a_fast_rise_is_judged_by_the_line_of_its_calves() -> None:
     line = Timeline().body(z=-0.1, over=0.6).body(z=0.05, over=0.12).home(over=0.6)
     limits = {}
     for motor in ("torque-speed", "ideal"):
-        report = FeasibilityChecker(RobotModel(motor=motor)).check(line)
+        report = Checker(RobotModel(motor=motor)).check(line)
         found = [
             f for f in report.failures if (f.check, f.subject) == ("torque at speed", "FL_calf")
         ]
@@ -216,7 +217,7 @@ def test_the_forces_are_those_of_a_dense_solver(pace: float, radius: float) -> N
 def test_a_trunk_that_the_ground_cannot_hold_stays_level_and_lags() -> None:
     # In MuJoCo it is 18 mm off and turned by 2.5 deg.
     line = Timeline().body(y=0.045, over=0.26).body(y=-0.045, over=0.26).home(over=0.26)
-    checked = FeasibilityChecker().evaluate(line)
+    checked = Checker().evaluate(line)
     force, moment = checked.forces.missing.max(axis=0)
     assert force > 20.0
     assert moment < 0.05
@@ -233,16 +234,16 @@ def nods(half: float, pitch: float) -> Timeline:
 def test_what_the_feet_cannot_give_for_a_moment_is_refused_if_it_is_much(model: RobotModel) -> None:
     # The trunk lags by a few millimetres only, but the feet slide: such a nod fell.
     quick = nods(0.1, 0.1)
-    (failure,) = FeasibilityChecker(model).check(quick).failures
+    (failure,) = Checker(model).check(quick).failures
     assert (failure.check, failure.subject) == ("contact wrench", "force")
     assert failure.value > FeasibilityLimits().jolt
-    assert FeasibilityChecker(model, FeasibilityLimits(jolt=1e3)).check(quick).ok
-    assert FeasibilityChecker(model).check(nods(0.12, 0.08)).ok
+    assert Checker(model, FeasibilityLimits(jolt=1e3)).check(quick).ok
+    assert Checker(model).check(nods(0.12, 0.08)).ok
 
 
 def test_a_force_that_lacks_as_a_plan_begins_at_speed_is_not_asked_for(model: RobotModel) -> None:
     # In MuJoCo the first slides by 2.7 mm, though it lacks four times as much.
-    checker, start = FeasibilityChecker(model), Timeline()
+    checker, start = Checker(model), Timeline()
     jumps = [
         line.body(x=0.02, over=0.4, ease="out") for line in (start, start.body(x=-0.02, over=0.5))
     ]
@@ -310,9 +311,7 @@ def test_a_foot_slides_as_a_block_does() -> None:
     assert ways[2000:, 2].max() == 0.0
 
 
-def test_joints_hold_a_foot_that_lacks_little(
-    checker: FeasibilityChecker, model: RobotModel
-) -> None:
+def test_joints_hold_a_foot_that_lacks_little(checker: Checker, model: RobotModel) -> None:
     checked = checker.evaluate(Timeline().body(z=-0.001, over=1.0).home(over=1.0))
     for lacks, slides in ((0.9 * HELD, False), (2.0 * HELD, True)):
         forces = np.zeros_like(checked.forces.contact)
@@ -356,7 +355,7 @@ def to_and_fro(channel: str, size: float, over: float, times: int = 2) -> Timeli
 
 
 def test_a_twist_that_slips_and_a_fast_roll_that_creeps_are_refused(
-    checker: FeasibilityChecker,
+    checker: Checker,
 ) -> None:
     # 69 mm on friction 0.5 in MuJoCo; the pyramid's diagonal gave 0.64.
     report = checker.check(to_and_fro("yaw", 0.268, 0.252))
@@ -375,14 +374,14 @@ def test_a_twist_that_slips_and_a_fast_roll_that_creeps_are_refused(
     + [("roll", 0.25, 0.2, math.inf), ("roll", 0.286, 0.247, math.inf)],
 )
 def test_a_sway_or_a_roll_that_hardly_slips_passes(
-    checker: FeasibilityChecker, channel: str, size: float, over: float, slips: float
+    checker: Checker, channel: str, size: float, over: float, slips: float
 ) -> None:
     report = checker.check(to_and_fro(channel, size, over))
     assert report.ok, report.table()
     assert report.margins["slip"].value < slips
 
 
-def test_feet_creep_by_what_contacts_leave_out(checker: FeasibilityChecker) -> None:
+def test_feet_creep_by_what_contacts_leave_out(checker: Checker) -> None:
     path = checker.evaluate(to_and_fro("roll", 0.371, 0.130)).path
     found, model = creep(path, checker.model), checker.model
     for row in range(0, len(path.times), 7):
@@ -392,7 +391,7 @@ def test_feet_creep_by_what_contacts_leave_out(checker: FeasibilityChecker) -> N
 
 
 def test_an_unloading_for_a_moment_passes_and_a_flight_does_not(
-    checker: FeasibilityChecker,
+    checker: Checker,
 ) -> None:
     def rise(over: float) -> Timeline:
         line = Timeline().body(z=-0.114, over=0.6).body(z=0.02, over=over)
@@ -404,7 +403,7 @@ def test_an_unloading_for_a_moment_passes_and_a_flight_does_not(
     assert "lag" in {finding.check for finding in flight.failures}
 
 
-def test_a_joint_at_its_stop_is_refused_by_what_it_moves(checker: FeasibilityChecker) -> None:
+def test_a_joint_at_its_stop_is_refused_by_what_it_moves(checker: Checker) -> None:
     # The calves are asked for 0.1 rad too much in the first: it is done in MuJoCo, 12 mm off.
     def nose_up(angle: float, z: float) -> Timeline:
         return Timeline().body(pitch=-deg(angle), z=z, over=1.0).hold(0.3).home(over=1.0)
@@ -418,7 +417,7 @@ def test_a_joint_at_its_stop_is_refused_by_what_it_moves(checker: FeasibilityChe
 
 
 def test_a_knee_that_folds_no_farther_moves_less_than_one_too_short(
-    checker: FeasibilityChecker,
+    checker: Checker,
 ) -> None:
     # In MuJoCo the first is done, 11 mm off; 22 mm are asked too much. The other is 26 mm off.
     sit = Timeline().posture("sit", over=1.5).body(z=-0.042, over=0.8).hold(0.3).home(over=0.6)
@@ -432,7 +431,7 @@ def test_a_knee_that_folds_no_farther_moves_less_than_one_too_short(
 
 @pytest.mark.parametrize(("angle", "is_refused"), [(38.0, False), (42.0, True), (44.0, True)])
 def test_hips_of_a_pair_that_stands_keep_clear_of_their_stops(
-    checker: FeasibilityChecker, angle: float, is_refused: bool
+    checker: Checker, angle: float, is_refused: bool
 ) -> None:
     # A trot that rolled by 52 deg, its hip 0.001 rad past its stop, passed and fell in MuJoCo.
     trot = Timeline().walk(-0.2, turn=deg(10.0), gait="trot")
@@ -450,7 +449,7 @@ def test_hips_of_a_pair_that_stands_keep_clear_of_their_stops(
     [(0.0, 0.12, True), (0.01, 0.12, True), (0.0, 0.3, False), (0.03, 0.12, False)],
 )
 def test_a_foot_lifted_shortly_needs_no_shift(
-    checker: FeasibilityChecker, aside: float, over: float, is_done: bool
+    checker: Checker, aside: float, over: float, is_done: bool
 ) -> None:
     # Without the shift the CoM lies on the edge; in MuJoCo the last is 31 mm off, the first two 9.
     line = Timeline(balance=False).body(y=aside, over=0.6).foot("FL", z=0.03, over=over)
