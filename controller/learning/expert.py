@@ -56,7 +56,7 @@ class Expert:
         """
         rng, task = np.random.default_rng(seed), self.task
         world = replace(task.draw_world(rng), delay=0.0)
-        number = int(rng.integers(max(len(task.terrains), 1)))
+        number = int(rng.integers(len(task.terrains))) if task.terrains else 0
         plant = MujocoPlant(
             terrain=task.terrains[number] if task.terrains else None,
             seed=seed,

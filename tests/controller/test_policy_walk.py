@@ -12,7 +12,7 @@ from controller import GO2Controller, Mode
 from controller.behaviours.learned import HAND_OVER
 from controller.behaviours.walking import Walking
 from controller.policies import TROT, Policy, probe
-from go2_wbc.errors import CommandError, PolicyError
+from go2_wbc.errors import CommandError, ModeError, PolicyError
 from go2_wbc.legs import Leg
 from go2_wbc.planning.locomotion import LocomotionPlanner
 from go2_wbc.plant import MujocoPlant
@@ -111,6 +111,8 @@ def test_while_it_is_handed_over_the_torques_pass_from_one_to_the_other(
     assert (np.ptp(shares, axis=1) < 1e-12).all()
     steps = np.diff(shares[:, 0])
     assert shares[-1, 0] == 1.0
+    with pytest.raises(ModeError, match="nothing to explain"):
+        go2.explain()
     assert (steps >= 0.0).all()
     assert steps.max() == pytest.approx(plant.control_period / HAND_OVER)
 

@@ -1,6 +1,7 @@
 """``go2-wbc sweep``: what is printed and written, which exit code."""
 
 import csv
+import inspect
 import json
 from functools import partial
 from importlib.util import find_spec
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from controller.cli.common import ExitCode, ProgressLine
-from controller.cli.sweep import tell
+from controller.cli.sweep import sweep_command, tell
 from controller.sweeps import read_sweep
 from controller.sweeps.run import Progress
 from tests.controller.cli.conftest import Run
@@ -37,6 +38,11 @@ def test_the_summary_fits_and_the_rows_are_kept(sweep: Run) -> None:
     (file,) = Path("out/sweeps").glob("*.sqlite")
     assert f"rows: {file}" in told.out
     assert len(read_sweep(file).rows) == 12
+
+
+def test_the_number_of_seeds_is_what_its_help_says() -> None:
+    assert inspect.signature(sweep_command).parameters["n"].default == 1000
+    assert "seeds, default 1000" in str(inspect.get_annotations(sweep_command)["n"])
 
 
 def test_on_its_way_a_sweep_tells_twenty_times_how_long_the_rest_will_take(

@@ -76,6 +76,10 @@ def test_it_walks_as_commanded_in_a_world_of_the_task(walked: dict[str, np.ndarr
         assert (walked[name] == walked[name][0]).all()
 
 
+def test_a_task_without_terrains_has_number_0(walked: dict[str, np.ndarray]) -> None:
+    assert not walked["terrain"].any()
+
+
 def test_the_phase_tells_which_feet_the_gait_wants_down(walked: dict[str, np.ndarray]) -> None:
     phase, stance = walked["phase"][25:], walked["stance"][25:]
     first = (phase >= 0.5) & (phase < 1.0)  # the trot's duty is a half, FL and RR begin at 0.5

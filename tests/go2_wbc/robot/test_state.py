@@ -1,9 +1,12 @@
 """What is read off a measured state, and the snapshot, against Pinocchio."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
+from go2_wbc.errors import CommandError
 from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rotation_from_rpy
@@ -210,3 +213,14 @@ def test_a_snapshot_does_not_change_with_the_next_one() -> None:
     for name in fields:
         np.testing.assert_array_equal(getattr(held, name), before[name], err_msg=name)
     assert held.state is state
+
+
+@pytest.mark.parametrize("name", ["tau", "q_des", "v_des", "kp", "kd"])
+def test_a_command_that_is_not_finite_or_of_another_shape_is_refused(name: str) -> None:
+    good = JointCommand(*np.arange(60.0).reshape(5, 12))
+    assert np.array_equal(good.numbers(), np.arange(60.0).reshape(5, 12))
+    for bad, said in ((np.full(12, np.nan), "not finite"), (np.zeros(11), "must have shape")):
+        with pytest.raises(CommandError, match=rf"command\.{name} .*{said}"):
+            replace(good, **{name: bad}).numbers()
+    huge = replace(good, **{name: np.full(12, 1e200)})
+    assert huge.numbers().max() == 1e200

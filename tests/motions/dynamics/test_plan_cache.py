@@ -34,8 +34,9 @@ def solver(plans: dict[str, DynamicTrajectory], monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_kept_plan_is_not_solved_again(solver: Solver, model: RobotModel, tmp_path: Path) -> None:
-    first = plan_cache.solve_cached(PROBLEM, model, folder=tmp_path)
-    second = plan_cache.solve_cached(PROBLEM, model, folder=tmp_path)
+    new = tmp_path / "new" / "below"
+    first = plan_cache.solve_cached(PROBLEM, model, folder=new)
+    second = plan_cache.solve_cached(PROBLEM, model, folder=new)
     assert solver.calls == 1
     assert first.to_bytes() == second.to_bytes()
 

@@ -1,15 +1,19 @@
 """Velocities and accelerations of a trajectory are the derivatives of what they belong to."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation
-from motions import Timeline, compile_timeline, deg
+from motions import Timeline, compile_timeline, deg, load_motion
 from motions.batch_kinematics import attitudes, configurations, rates
+from motions.dynamics.solver import PlanTarget
+from motions.plan.compiled_plan import DynamicSpan
 from motions.plan.tracks import SAMPLE_PERIOD
-from motions.plan.trajectory import trajectory_of
+from motions.plan.trajectory import as_written, trajectory_of
 
 STEP = 1e-3  # s; of the differences
 FINE_W, FINE_DW = 1e-4, 1e-3  # of a second derivative of about 1e2 /s^2 times the step squared
@@ -46,3 +50,20 @@ def test_configuration_velocity_and_acceleration_of_a_lively_motion_fit_together
         assert path.v[row] == pytest.approx(moved, abs=COARSE_V)
         gained = (path.v[row + 1] - path.v[row - 1]) / two
         assert path.a[row] == pytest.approx(gained, abs=COARSE_A)
+
+
+def test_what_was_written_differs_where_the_nearest_motion_was_planned_only(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model = RobotModel()
+    plan = compile_timeline(load_motion("jump_up"), model)
+    first, *others = plan.dynamic
+    near = replace(first, asked=object.__new__(PlanTarget))
+    path, (start, end) = trajectory_of(plan, model), (first.start, first.end)
+    monkeypatch.setattr(DynamicSpan, "written", lambda _, times: np.full((len(times), 19), 7.0))
+    written = as_written(replace(plan, dynamic=(near, *others)), path)
+    inside = (start <= path.times) & (path.times <= end)
+    assert 0 < inside.sum() < len(inside)
+    assert (written[inside] == 7.0).all()
+    assert np.array_equal(written[~inside], path.q[~inside])
+    assert np.array_equal(as_written(plan, path), path.q)
