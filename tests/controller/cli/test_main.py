@@ -201,11 +201,7 @@ def test_the_exit_code_of_a_command_is_passed_on(act: Callable[[Action], None], 
     [("act", "WARNING"), ("-v act", "INFO"), ("act -v", "INFO"), ("-v act --verbose", "INFO")],
 )
 def test_it_logs_what_happens_where_it_is_asked_to_before_or_behind_the_command(
-    words: str,
-    level: str,
-    act: Callable[[Action], None],
-    run: Run,
-    monkeypatch: pytest.MonkeyPatch,
+    words: str, level: str, act: Callable[[Action], None], run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     levels: list[int] = []
     monkeypatch.setattr(logging, "basicConfig", lambda **how: levels.append(how["level"]))

@@ -1,7 +1,5 @@
 """How often a motion is done in random worlds, as the studio counts it."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 

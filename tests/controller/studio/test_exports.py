@@ -1,7 +1,5 @@
 """What a studio writes beside the file: as the command line does, and a test that can fail."""
 
-from __future__ import annotations
-
 import shlex
 import sys
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The nearest motion that the robot can do, as a proposal: found, told, taken; or why none is."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from dataclasses import replace

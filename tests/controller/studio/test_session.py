@@ -1,7 +1,5 @@
 """A studio as its page sees it: drafts, saves, what is refused, and a file that misbehaves."""
 
-from __future__ import annotations
-
 import json
 import time
 import wave

@@ -1,7 +1,5 @@
 """A show plays the motions of a file one after the other, written as its author would."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

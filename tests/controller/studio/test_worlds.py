@@ -1,7 +1,5 @@
 """The world that the page chooses: verdict, play and parts that are kept are those of it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

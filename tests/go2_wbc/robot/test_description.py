@@ -108,9 +108,6 @@ def test_another_robot_is_refused_with_every_name_that_it_lacks(tmp_path: Path) 
     assert "FL_hip_joint" not in str(caught.value)
 
 
-# --- mesh files: every colour one part
-
-
 def test_colours_come_from_materials_and_grey_is_the_rest(tmp_path: Path) -> None:
     name = "package://example-robot-data/robots/go2_description/visuals/foot.dae"
     (part,) = read_mesh(find_description().mesh_path(name))

@@ -202,9 +202,6 @@ def test_numbers_that_make_no_sense_are_refused(name: str) -> None:
         PayloadConfig(**{name: bad})  # type: ignore[arg-type]
 
 
-# --- a payload is a point mass, and no other
-
-
 def test_its_inertia_is_that_of_a_point() -> None:
     place = np.array([0.1, -0.2, 0.3])
     inertia = Payload(2.0, (0.1, -0.2, 0.3)).inertia.matrix()

@@ -1,7 +1,5 @@
 """A motion is certified on the page: run by run, with its interval; ended by a button; a table."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,18 +1,12 @@
 """What the studio's page says in a choreographer's words, and where that is seen."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.viz.replay.browsing import Tab
 from tests.viz.replay.studio_tab import SETTLED, do, undo_all
 from viz.style import LEG_COLORS
-
-if TYPE_CHECKING:
-    pass
 
 pytestmark = pytest.mark.slow
 SAID = "document.getElementById('studio-say').textContent"

@@ -1,7 +1,5 @@
 """What takes its time on the studio's page: how far it is, how it is ended, what came of it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,10 +1,7 @@
 """The studio's 3D handles, zoom, music, and several bars and motions at once, as a user does it."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -12,9 +9,6 @@ import pytest
 from motions.music import click_track
 from tests.viz.replay.browsing import Tab
 from tests.viz.replay.studio_tab import SETTLED, do
-
-if TYPE_CHECKING:
-    pass
 
 pytestmark = pytest.mark.slow
 ON_BEAT = 0.01  #: s; a beat of a click track is found as near as that

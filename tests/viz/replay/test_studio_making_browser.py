@@ -1,10 +1,7 @@
 """What the studio's page makes of moves: split, laid out, joined to a show, as a user does it."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -13,9 +10,6 @@ from PIL import Image
 from motions import find_motion, motion_names
 from tests.viz.replay.browsing import Tab
 from tests.viz.replay.studio_tab import SETTLED, do
-
-if TYPE_CHECKING:
-    pass
 
 pytestmark = pytest.mark.slow
 SAID = "document.getElementById('studio-say').textContent"

@@ -1,7 +1,5 @@
 """The nearest motion is put beside one's own on the page, and taken or left by a key."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

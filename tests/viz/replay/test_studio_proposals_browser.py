@@ -1,7 +1,5 @@
 """What is computed is written out on the page: its lines are shown first, and what is elsewhere."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
