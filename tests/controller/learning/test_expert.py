@@ -74,10 +74,7 @@ def test_it_walks_as_commanded_in_a_world_of_the_task(walked: dict[str, np.ndarr
     for name, low, high in (("friction", 0.5, 1.0), ("mass_scale", 0.9, 1.1)):
         assert low <= walked[name][0] <= high
         assert (walked[name] == walked[name][0]).all()
-
-
-def test_a_task_without_terrains_has_number_0(walked: dict[str, np.ndarray]) -> None:
-    assert not walked["terrain"].any()
+    assert not walked["terrain"].any()  # there is none
 
 
 def test_the_phase_tells_which_feet_the_gait_wants_down(walked: dict[str, np.ndarray]) -> None:
