@@ -3,10 +3,11 @@
 With the share ``u`` of a span of ``T`` seconds and the ease ``s(u) = 3 u^2 - 2 u^3``, a coordinate
 goes from ``a`` to ``b`` as ``p = a + s (b - a)``; so ``v = s' (b - a) / T`` and
 ``a = s'' (b - a) / T^2``. Horizontally the span is the swing, or what is left of it after a delay
-and, up stairs, before its end; vertically each half of it; on rough ground its two parts are as the
-square roots of the ways up and down, so that the foot speeds up no more on one than on the other:
-halves made feet that rose to the next step push the robot down with its weight, and throw it when
-they slowed down.
+and, up stairs, before its end; vertically each half of it; on rough ground and on slopes its two
+parts are as the square roots of the ways up and down, so that the foot speeds up no more on one
+than on the other: halves made feet that rose to the next step push the robot down with its weight,
+and throw it when they slowed down. At 1 m/s on 18 deg two feet that went down by 0.22 m in half of
+the time took all load off those that stood, for 40 ms in each stride.
 
 How high a foot is raised, and how late it goes ahead, is settled when it leaves the ground. What is
 learnt of the ground meanwhile is for the next swing: a curve that was changed on the way jumped by
@@ -40,6 +41,7 @@ from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
 from go2_wbc.planning.gait_clock import Clock, foot_phase, pace
 from go2_wbc.planning.ground import (
+    STEEP,
     Ground,
     RoughConfig,
     apex_raise,
@@ -161,7 +163,8 @@ def begin_swing(
     swing.start[:] = p_foot
     swing.raised, swing.delay, swing.begun = apex_raise(ground, c), delay(ground), 0.0
     swing.beyond, swing.is_awaited, swing.early = 0.0, False, earliness(ground, ahead)
-    swing.peak = 0.0 if is_rough(ground) else 0.5
+    is_steep = np.hypot(ground.slope[0], ground.slope[1]) > STEEP
+    swing.peak = 0.0 if is_rough(ground) or is_steep else 0.5
 
 
 @subroutine

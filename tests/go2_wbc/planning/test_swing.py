@@ -233,6 +233,27 @@ def test_up_stairs_a_foot_is_above_its_place_before_it_comes_down(
     assert (last[:, 0] == 0.0).all() == comes_from_above
 
 
+@pytest.mark.parametrize(("slope", "peak"), [(-0.35, 41), (0.35, 51), (-0.1, 47), (0.1, 47)])
+def test_on_a_slope_a_foot_speeds_up_no_more_on_its_way_down_than_up(
+    slope: float, peak: int
+) -> None:
+    # Feet that went down by 0.22 m in half of the time took the load off those that stood. Where it
+    # is nearly level each way takes half of the swing, of 95 ticks.
+    model, trot = helpers.symmetric_model(), GAITS["trot"]
+    start = model.snapshot(helpers.state_of(helpers.standing_q()))
+    planner, found = LocomotionPlanner(model, trot, LocomotionConfig()), []
+    planner.start(start)
+    planner._state.ground.slope[0] = slope
+    planner._state.trunk.velocity[0] = 0.5
+    for n in range(round(2.0 * trot.period / TICK)):
+        now = start.replaced(state=replace(start.state, time=n * TICK))
+        asked = planner.update(now, VelocityCommand(0.5))
+        if asked.legs[0] != SWINGS:
+            break
+        found.append(asked.p_world_feet[0, 2])
+    assert np.argmax(found) == pytest.approx(peak, abs=1)
+
+
 HIGH = 0.05  # m of a foot above the ground when it may have come onto a step
 
 
