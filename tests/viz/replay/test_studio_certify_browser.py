@@ -15,13 +15,7 @@ pytestmark = pytest.mark.slow
 DOING = "document.getElementById('studio-doing')"
 RUNS = 3
 ROWS = "#certified tbody tr"
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("studio") / "nod.py"
-    path.write_text(NOD, encoding="utf-8")
-    return path
+FILE = "nod.py", NOD
 
 
 @pytest.fixture(scope="module", autouse=True)
