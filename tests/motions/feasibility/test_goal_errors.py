@@ -55,7 +55,8 @@ def test_the_nearest_motion_is_feasible_and_says_how_far_off_it_is(
     ("lag", "said"), [(0.02, "20 ms late"), (0.0, "0 ms late"), (-0.4, "400 ms early")]
 )
 def test_a_departure_says_where_it_is_greatest(lag: float, said: str) -> None:
-    departed = Departure(0.5, 2.0, 0.025, "FL_foot", 0.7, np.radians(4.0), 1.25, lag)
+    turn, foot = (np.radians(4.0), 1.25), (0.02, "FR_foot", 0.6)
+    departed = Departure(0.5, 2.0, 0.025, "FL_foot", 0.7, *turn, lag, *foot)
     assert str(departed) == (
         "0.50 to 2.00 s is the nearest to what was written: 25 mm off\n"
         f"(FL_foot at 0.70 s), 4.0 deg (at 1.25 s), {said}."
