@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from controller.studio.orders import STOPPED, Doing
 from go2_wbc.errors import StudioError
 from go2_wbc.world import DOUBTFUL, World
+from viz.content import ReplayContent
 
 if TYPE_CHECKING:
     from controller.sweeps.run import Progress
@@ -96,8 +97,15 @@ def row_of(rate: CertifiedRate, motion: str, base: str) -> dict[str, object]:
     return {**known, "motion": motion, "base": base}
 
 
-def with_rate(content: Prepared, rate: CertifiedRate) -> Prepared:
-    """What is shown, with the rate beside its verdict."""
+def with_rate(
+    content: ReplayContent | Prepared, rate: CertifiedRate | None
+) -> ReplayContent | Prepared:
+    """What is shown, with the rate beside its verdict, if there are both."""
+    if rate is None:
+        return content
+    if isinstance(content, ReplayContent):
+        verdict = content.verdict and replace(content.verdict, certified=rate)
+        return replace(content, verdict=verdict)
     header: dict[str, Any] = dict(content.header)
     if header["verdict"] is not None:
         header["verdict"] = {**header["verdict"], "certified": asdict(rate)}

@@ -29,8 +29,8 @@ from controller.studio.together import copied, edited_together, pasted
 from go2_wbc.errors import Go2WbcError, StudioError, unknown_name
 from go2_wbc.world import World
 from motions.authoring import Value
-from viz.content import ReplayContent
-from viz.replay.page_data import Prepared, prepared
+from viz.content import CertifiedRate, ReplayContent
+from viz.replay.page_data import Prepared
 from viz.replay.preview_server import PreviewServer
 
 _log = logging.getLogger(__name__)
@@ -70,11 +70,10 @@ class Studio:
         self._runner, self._player = Runner(), Runner()
         self._is_solved = self._is_looking = True  # all that jumps in what is saved; for what does
         self._is_away = False  # the file, when it was looked at last
-        self._changes: tuple[str, ...] = ()
-        self._copied: tuple[str, ...] = ()
+        self._changes = self._copied = self._motions = tuple[str, ...]()
         self._proposed: tuple[bytes, bytes] | None = None  # what was saved, and the nearest to it
         self._searches = set[threading.Event]()  # of what goes on; an edit ends it by its event
-        self._motions: tuple[str, ...] = ()
+        self._rates = dict[tuple[object, ...], CertifiedRate]()  # of ``_counted``
         self._bars: tuple[Bar, ...] = ()
         try:
             shown = self._run(self._project.saved, Task.EXPORT, longest=AT_ONCE)
@@ -349,22 +348,25 @@ class Studio:
 
         That is shown beside the verdict; told is a "row" of a table. The next edit ends it.
         """
-        data, base, motion = self._project.saved, self._project.base, self.motion or ""
+        base, motion, _, world = counted = self._counted
         tell = partial(self._told_of, "certify")
         try:
             with self._search_ended_by_edits() as ending:
-                around = self._writer(), order, self._world
-                rate = certifying.certified(*around, tell, ending)
+                rate = certifying.certified(self._writer(), order, world, tell, ending)
         except Go2WbcError as error:
             return {"error": str(error)}
         finally:
             tell(None)
         with self._lock:
-            if (base, motion) == (self._project.base, self.motion):
-                shown = self._run(data)
-                content = certifying.with_rate(prepared(self._content(shown)), rate)
-                self._server.publish(content, shown.title)
+            self._rates[counted] = rate
+            if counted == self._counted:
+                self.show()
         return {"row": certifying.row_of(rate, motion, base)}
+
+    @property
+    def _counted(self) -> tuple[str, str, str, World]:
+        """What a certificate is of: the text, its motion and its parameters, in a world."""
+        return self._project.base, self.motion or "", str(self._values), self._world
 
     @contextmanager
     def _search_ended_by_edits(self) -> Iterator[threading.Event]:
@@ -493,4 +495,5 @@ class Studio:
     def _content(self, shown: Answer) -> ReplayContent | Prepared:
         editor = bars.editor(shown, self._project, self._world, self._ground)
         self._motions = shown.motions
-        return replace(shown.shown(), editor=editor)
+        content = replace(shown.shown(), editor=editor)
+        return certifying.with_rate(content, self._rates.get(self._counted))

@@ -12,7 +12,7 @@ from controller.sweeps import run
 from controller.sweeps.summary import rate_interval
 from go2_wbc.errors import StudioError
 from go2_wbc.world import DOUBTFUL, World
-from tests.viz.page_reader import read_message, read_pack
+from tests.viz.page_reader import read_data, read_message, read_pack
 
 NOD = '''"""Nods."""
 
@@ -71,6 +71,13 @@ def test_every_run_is_told_and_the_interval_narrows(
     certified = header["verdict"]["certified"]
     assert (certified["n"], certified["done"], certified["outdated"]) == (RUNS, row["done"], "")
     assert len(certified["worst"]) == RUNS
+    page = studio._project.path.with_suffix(".html")
+    assert "told" in studio.export({"kind": "html"})
+    assert read_data(page.read_text("utf-8"))[0]["verdict"]["certified"] == certified
+    studio.meet({"friction": 0.4})
+    studio.export({"kind": "html", "again": True})
+    assert read_data(page.read_text("utf-8"))[0]["verdict"]["certified"] is None, "another world"
+    studio.meet({})
 
 
 def counting(

@@ -114,9 +114,9 @@ function listen(player) {
     if (state.version !== version) {
       if (state.version !== player.data.header.version) {
         const data = await fetched(player.data);
-        if (data !== player.data) player.use(data); // the studio may have shown it already
+        if (data !== player.data && !studio?.certify.keeps(data)) player.use(data); // the studio may have shown it already
       }
-      version = player.data.header.version;
+      version = state.version;
       sliders.use(player.data.header);
       studio?.use(player.data.header.editor);
     }

@@ -30,6 +30,18 @@ class Certify {
     this.use(this.studio.editor);
   }
 
+  // Whether what is shown stays: beside what was played of the same text its certificate is shown.
+  /** @param {ReplayData} data */
+  keeps({ header }) {
+    const shown = this.studio.player.data.header;
+    const { certified } = header.verdict ?? {};
+    const [now, then] = [header, shown].map(({ editor: { base, motion, world }, sliders }) => JSON.stringify([base, motion, world, sliders]));
+    if (shown.is_plan || !certified || now !== then) return false;
+    shown.verdict.certified = certified;
+    showTrust(shown.verdict);
+    return true;
+  }
+
   // Rows of another text than the present one are pale.
   /** @param {Editor} editor */
   use({ base }) {
