@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import signal
 import sys
 import time
 import webbrowser
@@ -45,6 +46,7 @@ def run(
     from go2_wbc.plant.mujoco.viewer import display_problem
 
     path, name = _file_of(motion)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # it ends its processes, too
     with Studio(path, name, live.port) as studio:
         try:
             if json:
