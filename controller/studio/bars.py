@@ -34,7 +34,8 @@ WORDS: Mapping[str, Sequence[str]] = {
 
 _BAR = tuple(field.name for field in fields(Bar))
 _SLOT = tuple(field.name for field in fields(Slot) if field.name != "is_choice")
-_DRAFT = ("name", "number", "span", "parts", "broken", "values")  #: What a drag changes of a bar
+_DRAFT = ("name", "number", "span", "parts", "broken", "values", "is_idle")
+"""What a drag changes of a bar."""
 
 
 def editor(

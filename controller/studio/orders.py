@@ -101,6 +101,7 @@ class Bar:
     callers: tuple[tuple[tuple[int, int], int], ...] = ()  #: see ``motions.language.tracing``
     file: str = ""  #: where it is written, if that is another one
     line: int = 0  #: of that file
+    is_idle: bool = False  #: nothing moves in its span, and it is no pause: it is there already
 
 
 @dataclass(frozen=True, slots=True)

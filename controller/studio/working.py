@@ -16,6 +16,8 @@ from multiprocessing.connection import Connection
 from multiprocessing.synchronize import Event
 from typing import TYPE_CHECKING, final
 
+import numpy as np
+
 from controller.studio import worlds
 from controller.studio.grounds import PlayedGround
 from controller.studio.literals import Run
@@ -41,12 +43,14 @@ if TYPE_CHECKING:
     from controller.go2_controller import GO2Controller
     from controller.studio.jumping import Jumps
     from controller.studio.making import Made, Maker
+    from go2_wbc.recording import Recording
     from motions import CheckedMotion, FeasibilityChecker, Timeline
     from motions.language.tracing import CallMark
     from viz.content import ReplayContent
 
 
 RARELY = 100_000  #: New objects after which what is unused is looked for; an edit makes 3,000
+LEAST_MOVE = 5e-4  #: m or rad, of the trunk or a joint: what moves less is at rest
 PERIOD = 0.1  #: s, between two words of how far it is
 
 
@@ -263,6 +267,7 @@ def _bars(
     order: Order, source: Source, marks: Sequence[CallMark], content: ReplayContent
 ) -> Iterator[Bar]:
     runs = Counter((mark.call.file, mark.call.site) for mark in marks)
+    plan = content.recording if content.is_plan else content.ghost
     is_draft = order.task is Task.DRAFT
     for mark in marks:
         call = mark.call
@@ -287,7 +292,15 @@ def _bars(
             call.callers,
             "" if is_here else call.file,
             0 if is_here else call.site[0],
+            plan is not None and "time" not in parts and _rests(plan, mark.start, mark.end),
         )
+
+
+def _rests(plan: Recording, start: float, end: float) -> bool:
+    """Whether nothing moves from one time [s] to another."""
+    first, last = np.searchsorted(plan.time, (start, end))
+    q = plan.q[first:last]
+    return len(q) > 1 and bool(np.all(np.ptp(q, axis=0) < LEAST_MOVE))
 
 
 def _chosen(slots: Sequence[Slot], values: Mapping[str, float | str]) -> Iterator[Slot]:

@@ -44,6 +44,8 @@ interface Bar {
   /** Where it is written, if that is another file. */
   file: string;
   line: number;
+  /** Nothing moves in its span, and it is no pause. */
+  is_idle: boolean;
 }
 
 /** What the studio shows; see `controller.studio.session`. */

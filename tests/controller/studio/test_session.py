@@ -156,6 +156,14 @@ def test_an_edit_is_saved_shown_and_undone(studio: Studio, file: Path) -> None:
     assert _editor(studio)["bars"][0]["span"][2] == pytest.approx(0.6)
 
 
+def test_a_call_that_moves_nothing_is_told_and_a_pause_is_none(studio: Studio) -> None:
+    _edit(studio, 0, op="insert", title="Pause")
+    _edit(studio, 0, op="duplicate")
+    told = [(bar["name"], bar["is_idle"]) for bar in _editor(studio)["bars"]]
+    assert told[:3] == [("body", False), ("body", True), ("hold", False)]
+    assert not any(is_idle for _, is_idle in told[3:])
+
+
 def test_what_the_language_refuses_is_not_written(studio: Studio, file: Path) -> None:
     answer = _edit(studio, 2, op="delete")
     told = "the front right foot is not up there: raise it before (line 13)"

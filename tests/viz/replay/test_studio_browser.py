@@ -163,6 +163,8 @@ def test_keys_reach_every_bar(tab: Tab, file: Path) -> None:
         keys.press(press)
         tab.wait_for(SETTLED)
         assert file.read_text(encoding="utf-8") == changed
+        idle = tab.page.locator(".bar.idle").count(), tab.page.locator("#inspector .idle").count()
+        assert idle == ((1, 1) if press == "d" else (0, 0)), "it is at home already"
         keys.press("Control+z")
         tab.wait_for(SETTLED)
         assert file.read_text(encoding="utf-8") == GREET

@@ -35,6 +35,7 @@ class Inspector {
     title.replaceChildren(element("b", { textContent: described(bar)[0] + this.more }), ` ${bar.name}(), ${where}`);
     rows.replaceChildren(...bar.slots.map((slot) => this.row(bar, slot, editor, timeUnit)));
     if (!isOwn(bar)) rows.append(element("p", { textContent: elsewhere(bar, editor.bars) }));
+    if (bar.is_idle) rows.append(element("p", { className: "idle", textContent: `It ${IDLE}.` }));
     if (bar.broken) rows.append(element("p", { className: "broken", textContent: bar.broken }));
     if (isOwn(bar) && bar.more.length) rows.append(this.adder(bar, editor));
     this.offer(bar, rows);

@@ -17,6 +17,8 @@ class Tracks {
   /** @type {{ bar: Bar, index: number, lane: string, row: number, next: number }[]} */ items;
   /** @type {{ index: number, end?: number }} */ dragged;
   /** @type {number} */ goal;
+  /** @type {number} */ time;
+  /** @type {boolean} */ isAsked;
   /** @type {string} */ drawn;
 
   constructor(studio, view) {
@@ -122,7 +124,7 @@ class Tracks {
       button.remove();
       this.made.delete(key);
     }
-    this.show(this.studio.player.time);
+    this.point(this.studio.player.time);
   }
 
   make(key, lane, index) {
@@ -145,11 +147,12 @@ class Tracks {
     const [first] = lanesOf(bar);
     const isStop = index === (selected ?? 0) && (lane === first || !this.strips.has(first));
     button.tabIndex = isStop ? 0 : -1;
-    const stamp = JSON.stringify([bar.name, bar.values, bar.span, bar.broken, isOn, row, bar.site]);
+    const stamp = JSON.stringify([bar.name, bar.values, bar.span, bar.broken, bar.is_idle, isOn, row, bar.site]);
     if (button.stamp === stamp) return;
     button.stamp = stamp;
     button.classList.toggle("on", isOn);
     button.classList.toggle("broken", Boolean(bar.broken));
+    button.classList.toggle("idle", bar.is_idle);
     button.classList.toggle("foreign", !isOwn(bar));
     button.setAttribute("aria-pressed", String(isOn));
     button.style.top = `${ROW * row + 1}px`;
@@ -189,7 +192,7 @@ class Tracks {
   label(bar, inside, beside) {
     const again = bar.runs > 1 ? ` ${bar.number + 1}/${bar.runs}` : "";
     const [long, brief] = described(bar);
-    const texts = [long + again, long, brief];
+    const texts = [...(bar.is_idle ? [`${long}, ${IDLE}`, `${long}, no change`] : []), long + again, long, brief];
     const fits = (room) => texts.find((text) => this.widthOf(text) <= room);
     const within = fits(inside);
     if (within) return [within, false];
@@ -204,8 +207,19 @@ class Tracks {
     return this.widths.get(text);
   }
 
-  // As the player's charts: where it is now.
+  // As the player's charts, in the frame in which they are drawn.
   show(t) {
+    this.time = t;
+    if (this.isAsked) return;
+    this.isAsked = true;
+    requestAnimationFrame(() => {
+      this.isAsked = false;
+      this.point(this.time);
+    });
+  }
+
+  // The line is where it is now.
+  point(t) {
     const x = this.xAt(t);
     this.head.hidden = x < 0 || x > this.width;
     this.head.style.transform = `translateX(${LANE_LEFT + x}px)`;

@@ -51,6 +51,8 @@ const SIGNS = { Rise: "\u2191", Sink: "\u2193", "Put down": "\u2193", Raise: "\u
   "Nose up": "\u2197", "Turn left": "\u21b6", "Turn right": "\u21b7", "Lean right": "\u21bb", "Lean left": "\u21ba", Home: "\u2302", Pause: "\u2016",
   Left: "\u2196", Right: "\u2199", Look: "\u25ce", Walk: "\u2192", Step: "\u2192" };
 
+const IDLE = "changes nothing: it is there already"; // a call in whose span nothing moves
+
 // What a call does, in a few words and in fewer.
 /**
  * @param {Bar} bar
@@ -105,6 +107,7 @@ function toldOf(bar, bars) {
   return [
     `${readable(whose + described(bar)[0])}. From ${start.toFixed(2)} to ${end.toFixed(2)} s.`,
     move > start + 0.01 ? `Hatched: for ${(move - start).toFixed(2)} s the trunk shifts over the feet that stay.` : "",
+    bar.is_idle && `${readable(IDLE)}.`,
     bar.broken && `The robot cannot do it: ${bar.broken}`,
     isOwn(bar) ? `${bar.name}(), line ${bar.site[0]}${bar.runs > 1 ? `, time ${bar.number + 1} of ${bar.runs}` : ""}` : elsewhere(bar, bars),
   ].filter(Boolean).join("\n");
