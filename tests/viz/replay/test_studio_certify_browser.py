@@ -40,6 +40,9 @@ def test_the_interval_is_told_run_by_run_and_stays_as_a_row(tab: Tab, file: Path
     options = tab.page.locator("[aria-label=Certify] option").all_inner_texts()
     assert options == ["Certify…", "20 runs", "50 runs", "100 runs", "200 runs"]
     assert not tab.is_shown("#certified")
+    tab.evaluate("studio.play()")
+    assert tab.text("#who").startswith("played in MuJoCo: done")
+    tab.evaluate("replay.play(false)")
     _hear(tab, f"(window.told ??= []).push({DOING}.textContent, {DOING}.innerHTML)")
     tab.evaluate(f"void studio.certify.play({RUNS})")
     tab.wait_for(f"document.querySelector('{ROWS}')")
@@ -53,7 +56,10 @@ def test_the_interval_is_told_run_by_run_and_stays_as_a_row(tab: Tab, file: Path
     assert cells[0] == "Nod"
     assert cells[1].startswith("friction 0.5 +-10 %")
     assert cells[2:] == ["3 of 3", "29.2 % to 100 %"]
+    tab.wait_for("!document.getElementById('certificate').hidden")
     assert tab.text("#certificate summary b") == "Certificate: done in 3 of 3 runs"
+    assert tab.text("#who").startswith("played in MuJoCo: done"), "that stays"
+    assert tab.evaluate("!replay.data.header.is_plan && replay.data.ghost !== null")
     assert tab.evaluate(FINDINGS)[1] == []
     for width in (1280, 800):
         tab.resize(width, 720)
@@ -88,3 +94,24 @@ def test_it_is_cancelled(tab: Tab, file: Path) -> None:
     tab.wait_for(f"{DOING}.hidden")
     assert tab.page.locator(ROWS).count() == count
     assert file.read_text(encoding="utf-8") == NOD
+
+
+def test_nothing_moves_where_something_is_told(tab: Tab) -> None:
+    """Buttons went to a further row, and bars from under the pointer."""
+    rate = "{ what: 'certifying', done: 15, whole: 20, rate: [12, 0.548, 0.93] }"
+    broken = "{ is_broken: true, limit: 'Torque', subject: 'FL', time: 0, text: 'x'.repeat(200) }"
+    place = "['#bars', '[data-ask=play]', '#stage'].flatMap((which) => {"
+    place += " const { top, height } = document.querySelector(which).getBoundingClientRect();"
+    place += " return [top, height]; })"
+    for size in ((1440, 900), (1280, 800)):
+        tab.resize(*size)
+        before = tab.evaluate(place)
+        tab.evaluate(f"studio.doing.use({{ certify: {rate} }}), studio.tell('word '.repeat(99))")
+        tab.evaluate(f"studio.doing.explain(studio.editor, [{broken}])")
+        assert tab.is_shown("#studio-doing button")
+        assert tab.is_shown("#studio-why button")
+        assert tab.evaluate(place) == before
+        tab.evaluate("studio.doing.use({}), studio.doing.explain(studio.editor, []), 0")
+        tab.wait_for(f"{DOING}.hidden")
+        tab.evaluate("studio.tell('')")
+    tab.resize(*SIZE)

@@ -71,7 +71,7 @@ class Doing {
     this.why.hidden = !limit;
     if (!limit) return;
     const text = bar ? `${described(bar)[0]}: ${bar.broken}` : end ? `The motion is not over: ${end.text}` : `${limit.limit}, ${limit.subject}: ${limit.text}`;
-    const reason = element("button", { textContent: text, title: "Go there" });
+    const reason = element("button", { textContent: text, title: `${text}\nGo there` });
     reason.addEventListener("click", () => (bar ? studio.select(bars.indexOf(bar)) : studio.player.scrub((end ?? limit).time)));
     this.why.replaceChildren(reason);
     this.why.append(...buttonsOf(this.missing(annotations)).children);

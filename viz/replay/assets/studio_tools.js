@@ -31,7 +31,9 @@ class Tools {
     this.fill(studio);
     this.notes = element("p", { id: "studio-notes" });
     this.show = this.button("do", "show", "Make a show", "Writes a motion that plays the others one after the other, in the order of the file");
-    this.box.append(this.tabs, this.show, this.say, studio.doing.line, this.robot, studio.world.box, this.row, this.changes, studio.doing.why, this.notes);
+    const status = element("div", { id: "studio-status" }); // of one height: bars and buttons stay where they are
+    status.append(this.say, studio.doing.line, studio.doing.why);
+    this.box.append(this.tabs, this.show, this.robot, studio.world.box, this.row, status, this.changes, this.notes);
   }
 
   fill(studio) {
@@ -149,7 +151,7 @@ class Tools {
   }
 
   tell(text, isBad) {
-    this.say.textContent = text;
+    this.say.textContent = this.say.title = text;
     this.say.classList.toggle("bad", isBad);
   }
 
