@@ -51,6 +51,7 @@ if TYPE_CHECKING:
 
 RARELY = 100_000  #: New objects after which what is unused is looked for; an edit makes 3,000
 LEAST_MOVE = 5e-4  #: m or rad, of the trunk or a joint: what moves less is at rest
+POSING = ("body", "pose", "home")  #: Calls that are of time only where they change nothing
 PERIOD = 0.1  #: s, between two words of how far it is
 
 
@@ -292,7 +293,9 @@ def _bars(
             call.callers,
             "" if is_here else call.file,
             0 if is_here else call.site[0],
-            plan is not None and "time" not in parts and _rests(plan, mark.start, mark.end),
+            plan is not None
+            and ("time" not in parts or call.name in POSING)
+            and _rests(plan, mark.start, mark.end),
         )
 
 
