@@ -95,7 +95,9 @@ def name_of(block: Block) -> str:
 
 def words_of(block: Block) -> list[list[str]]:
     """Words of every shell line of a block, comments dropped."""
-    lines = (shlex.split(line, comments=True) for line in block.text.splitlines())
+    lines = (
+        shlex.split(line, comments=True) for line in block.text.replace("\\\n", "").splitlines()
+    )
     return [words for words in lines if words]
 
 
