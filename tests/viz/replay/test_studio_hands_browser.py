@@ -227,7 +227,8 @@ def test_a_bar_ends_on_a_beat_of_the_song(tab: Tab, file: Path) -> None:
     box = tab.page.locator("[data-bar='0']").bounding_box() or {}
     right, middle = box["x"] + box["width"], box["y"] + box["height"] / 2
     second = box["width"] / 0.6
-    for ease in ("", r", ease=\"cubic\""):  # it turns back there, where that is asked for
+    assert "Accent is on" in tab.text("#studio-say")
+    for ease in (r", ease=\"cubic\"", ""):  # it turns back there, where that is not switched off
         tab.page.mouse.move(right - 3, middle)
         tab.page.mouse.down()
         tab.page.mouse.move(right - 3 + 0.5 * second + 2, middle, steps=3)
@@ -238,7 +239,7 @@ def test_a_bar_ends_on_a_beat_of_the_song(tab: Tab, file: Path) -> None:
         assert abs((end - 0.5 + 0.3) % 0.6 - 0.3) < ON_BEAT, "a click track of 100 begins at 0.5 s"
         do(tab, "studio.act('undo')")
         tab.evaluate("studio.music.accent.click()")
-    assert tab.evaluate("studio.music.accent.getAttribute('aria-pressed')") == "false"
+    assert tab.evaluate("studio.music.accent.getAttribute('aria-pressed')") == "true"
     do(tab, "studio.act('redo')")
     tab.page.get_by_label("Music", exact=True).select_option(index=0)
     tab.wait_for("replay.sound.audio === null")

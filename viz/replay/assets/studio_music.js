@@ -31,12 +31,8 @@ class Music {
       this.draw();
     });
     this.accent = element("button", { textContent: "Accent", title: "What you end on a beat gets the ease with which it is seen there: ease=\"cubic\" for the trunk, \"in\" for a foot that is put down" });
-    this.accent.setAttribute("aria-pressed", "false");
-    this.accent.addEventListener("click", () => {
-      this.isSharp = !this.isSharp;
-      this.accent.classList.toggle("on", this.isSharp);
-      this.accent.setAttribute("aria-pressed", String(this.isSharp));
-    });
+    this.accent.addEventListener("click", () => this.sharpen(!this.isSharp));
+    this.sharpen(false);
     this.tempo = element("output", { id: "tempo" });
     this.buttons = element("div", { className: "buttons" });
     this.buttons.setAttribute("role", "group");
@@ -61,6 +57,12 @@ class Music {
     this.draw();
   }
 
+  sharpen(isSharp) {
+    this.isSharp = isSharp;
+    this.accent.classList.toggle("on", isSharp);
+    this.accent.setAttribute("aria-pressed", String(isSharp));
+  }
+
   async choose(name) {
     const { player } = this.studio;
     this.taps = [];
@@ -72,7 +74,8 @@ class Music {
       else {
         this.song = { name, ...answer, peaks: bytesOf(answer.peaks) };
         Object.assign(this, { beats: answer.beats, metre: answer.metre, downbeat: answer.downbeat });
-        this.studio.tell("");
+        this.sharpen(true);
+        this.studio.tell("Accent is on: what you end on a beat gets the ease with which it is seen there");
         player.sound.keep(bytesOf(answer.sound));
       }
     }
