@@ -46,7 +46,7 @@ def run(
     from go2_wbc.plant.mujoco.viewer import display_problem
 
     path, name = _file_of(motion)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # it ends its processes, too
+    usual = signal.signal(signal.SIGTERM, signal.default_int_handler)  # it ends its processes, too
     with Studio(path, name, live.port) as studio:
         try:
             if json:
@@ -65,6 +65,8 @@ def run(
                 studio.look()
         except KeyboardInterrupt:
             return ExitCode.OK
+        finally:
+            signal.signal(signal.SIGTERM, usual)
 
 
 def _file_of(word: str) -> tuple[Path, str | None]:

@@ -166,7 +166,7 @@ def departure_measurements(plan: MotionPlan, model: RobotModel) -> dict[str, flo
         "the same, at [s]": farthest.place_time,
         "plan turned off what was written [deg]": float(np.degrees(most_turned.angle)),
         "the same turn, at [s]": most_turned.angle_time,
-        f"plan's {foot.foot} off what was written [m]": foot.foot_place,
+        "plan's feet off what was written [m]": foot.foot_place,
         "the same foot, at [s]": foot.foot_time,
         "plan late [s]": max((one.lag for one in found), key=abs),
     }
