@@ -11,24 +11,7 @@ from pathlib import Path
 from typing import final
 
 from go2_wbc.errors import CommandError, unknown_name
-from motions import CompiledPlan, Timeline, load_plan
-from motions.saved.files import read_motion
-
-MOTION, PLAN = ".json", ".plan"  #: Endings of what ``save_motion`` and ``save_plan`` write
-
-
-def is_saved(name: str) -> bool:
-    """Whether ``name`` is that of a saved motion or plan, by its ending."""
-    return name.endswith((MOTION, PLAN))
-
-
-def read_saved(file: Path) -> Timeline | CompiledPlan:
-    """What is saved in a file.
-
-    Raises:
-        MotionFileError: if it is missing, damaged, or not what this project has written.
-    """
-    return load_plan(file) if file.suffix == PLAN else read_motion(file)
+from motions.saved.files import is_saved
 
 
 @final
@@ -52,12 +35,11 @@ class SavedMotions:
         found = (file for file in home.iterdir() if is_saved(file.name) and file.is_file())
         return tuple(sorted(file.name for file in found if file.resolve().parent == home))
 
-    def read(self, name: str) -> Timeline | CompiledPlan:
-        """The one of this name.
+    def file(self, name: str) -> Path:
+        """The file of this name, which ``GO2Controller.prepare`` takes.
 
         Raises:
             CommandError: for an unknown name; lists the valid ones.
-            MotionFileError: for a file that is damaged.
         """
         if self.folder is None:
             raise CommandError(
@@ -65,4 +47,4 @@ class SavedMotions:
             )
         if name not in (names := self.names):
             raise CommandError(unknown_name("saved motion", f"{name:.80}", names))
-        return read_saved(self.folder / name)
+        return self.folder / name

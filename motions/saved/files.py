@@ -241,6 +241,11 @@ def is_saved_plan(name: str | Path) -> bool:
     return str(name).endswith(PLAN_FORMAT.suffix)
 
 
+def is_saved(name: str | Path) -> bool:
+    """Whether ``name`` is that of a saved motion or plan, by its ending."""
+    return str(name).endswith((MOTION_FORMAT.suffix, PLAN_FORMAT.suffix))
+
+
 def _arrays_of(file: Path) -> dict[str, np.ndarray]:
     content = content_of(file)
     try:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from controller.bridges.saved_motions import SavedMotions, is_saved
+from controller.bridges.saved_motions import SavedMotions
 from controller.go2_controller import GO2Controller
 from controller.jobs import Job, JobServer, Reply
 from controller.modes import Aborted, Measurements, Mode, Outcome
 from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
 from go2_wbc.motion_plan import MotionPlan, Posture
-from motions import Timeline, find_motion
+from motions import Playable, find_motion
 from motions.authoring import parse_values
+from motions.saved.files import is_saved
 
 NONE_SAVED = SavedMotions()  #: Only motions of the library
 STOP, DAMP = "stop", "damp"
@@ -107,12 +108,12 @@ def motion_job(
     return Job(motion, lambda job: _measured(go2, lambda _go2: play(job)), reply, prepare)
 
 
-def _meant(motion: str, settings: Sequence[str], saved: SavedMotions) -> Timeline | MotionPlan:
+def _meant(motion: str, settings: Sequence[str], saved: SavedMotions) -> Playable:
     if not is_saved(motion):
         return find_motion(motion)(**parse_values(settings))
     if settings:
         raise CommandError(f"{motion}: a saved motion has no parameters, got {', '.join(settings)}")
-    return saved.read(motion)
+    return saved.file(motion)
 
 
 def _take_entry(go2: GO2Controller, plan: MotionPlan) -> bool:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from statistics import fmean
 from typing import Final
 
-from controller.bridges.saved_motions import is_saved, read_saved
 from controller.bridges.unitree.plant import UnitreePlant
 from controller.go2_controller import GO2Controller
 from go2_wbc.config import Config
 from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
 from go2_wbc.validation import FINITE, POSITIVE, ranged
 from motions import FeasibilityChecker
+from motions.saved.files import is_saved
 
 SETTLE: Final = 1.5  #: Time [s] of a trot before its speed is measured
 SAMPLE: Final = 0.02  #: Time [s] between two samples of the speed
@@ -50,7 +49,7 @@ def check_steps(names: list[str]) -> None:
     """
     for name in names:
         if is_saved(name):
-            FeasibilityChecker().plan(read_saved(Path(name)))
+            FeasibilityChecker().plan(name)
         elif name not in STEPS:
             raise CommandError(unknown_name("step", name, (*STEPS, "FILE.json", "FILE.plan")))
 
