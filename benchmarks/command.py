@@ -4,20 +4,23 @@ import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import wraps
+from functools import partial, wraps
 from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Any
 
-from benchmarks import store
 from benchmarks.report import render, summarise, threshold_text
-from benchmarks.study import IDEAL, IMU, Results, Study, Task, chosen_studies, run_tasks, tasks_of
+from benchmarks.study import IDEAL, IMU, Results, Study, TrialResult, chosen_studies
 from controller.cli.common import ExitCode, ProgressLine, output, print_json, reader
 from controller.cli.sweep import tell
-from controller.sweeps.run import SweepResult, sweep
+from controller.sweeps.run import Progress, SweepResult, sweep
+from controller.sweeps.sweep_file import SEED
+from controller.sweeps.targets import Target, code_digest
 from go2_wbc.errors import ConfigError, MissingDependency
 from go2_wbc.files import write_atomically
 
+ROOT = Path(__file__).resolve().parent.parent
+FOLDER = Path("out/benchmarks")  #: Where rows are kept, in a folder for each benchmark
 SEEDS, QUICK_SEEDS = 20, 3
 
 positive = reader(int, lambda value: value > 0, "at least 1")
@@ -27,7 +30,7 @@ Sensors = Annotated[
 Jobs = Annotated[int, "N", "processes, default %(default)s", positive]
 Listed = Annotated[bool, "list the metrics, run nothing"]
 Resume = Annotated[bool, "skip what an interrupted run has finished"]
-RowsFile = Annotated[Path | None, "FILE", f"keep rows here, default in {store.FOLDER}"]
+RowsFile = Annotated[Path | None, "FILE", f"keep rows here, default in {FOLDER}"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,8 +116,8 @@ class Benchmark:
         studies = [study for study in self.studies if study.sensors or sensors == IDEAL]
         studies = [study.on(sensors) for study in chosen_studies(studies, chosen.rows)]
         seeds = chosen.seeds or (QUICK_SEEDS if chosen.quick else SEEDS)
-        tasks = [] if chosen.list else tasks_of(studies, seeds)
-        return self._report(studies, tasks, output, jobs=chosen.jobs, resume=chosen.resume)
+        seeds = 0 if chosen.list else seeds
+        return self._report(studies, seeds, output, jobs=chosen.jobs, resume=chosen.resume)
 
     def _repeated(
         self,
@@ -128,8 +131,8 @@ class Benchmark:
         studies = chosen_studies(self.studies, names)
         if not list:
             studies = self._possible(studies, is_named=bool(names))
-        tasks = [] if list else tasks_of(studies, runs or self.runs)
-        return self._report(studies, tasks, output, jobs=1, resume=resume)
+        seeds = 0 if list else runs or self.runs
+        return self._report(studies, seeds, output, jobs=1, resume=resume)
 
     def _possible(self, studies: Sequence[Study], *, is_named: bool) -> Sequence[Study]:
         """Those of ``studies`` that can be run; the others are told of, or raise if they must."""
@@ -146,41 +149,63 @@ class Benchmark:
     def _report(
         self,
         studies: Sequence[Study],
-        tasks: Sequence[Task],
+        seeds: int,
         output: Output,
         *,
         jobs: int,
         resume: bool,
     ) -> int:
-        """List the metrics without a task; else run them, print and write the report."""
-        if not tasks:
+        """List the metrics without a seed; else run them, print and write the report."""
+        if not seeds:
             _print_list(studies)
             return ExitCode.OK
-        report = summarise(studies, measure_all(self.name, tasks, jobs=jobs, resume=resume))
+        found = measure_all(self.name, studies, seeds, jobs=jobs, resume=resume)
+        report = summarise(studies, found)
         return output.publish(report.as_dict(), render(report))
 
 
-def measure_all(name: str, tasks: Sequence[Task], *, jobs: int, resume: bool) -> Results:
-    """Run the tasks, tell of every result on standard error, and keep it on disk at once."""
-    studies = {study.name: study for study, _ in tasks}
-    results: Results = {study: {} for study in studies}
-    folder = store.FOLDER / name
-    with store.opened(folder, studies.values(), resume=resume) as kept, ProgressLine() as line:
-        if kept.finished:
-            print(f"{len(kept.finished)} finished trials are taken from {folder}", file=sys.stderr)
-        left = [(s, seed) for s, seed in tasks if (s.name, seed) not in kept.finished]
-        for study, seed in {(s.name, seed) for s, seed in tasks} & kept.finished.keys():
-            results[study][seed] = kept.finished[study, seed]
-        line.update(0.0, "starting")
-        for study, seed, result in run_tasks(left, jobs):
-            kept.add(study, seed, result)
-            results[study.name][seed] = result
-            done = sum(map(len, results.values()))
-            place = f"{done}/{len(tasks)} {study.name}, seed {seed}"
-            failures = [f"{metric}: {why}" for metric, why in result.failures.items()]
-            line.done(f"{place}: {result.reason or '; '.join(failures) or 'ok'}")
-            line.update(done / len(tasks), place)
+def measure_all(
+    name: str, studies: Sequence[Study], seeds: int, *, jobs: int, resume: bool
+) -> Results:
+    """Sweep the studies, one after the other; of every trial is told, and its row kept at once.
+
+    The number of seeds is multiplied by a study's factor. A process that dies costs no other trial
+    its result. To be called from the main thread.
+    """
+    results: Results = {}
+    total = seeds * sum(study.seed_factor for study in studies)
+    about = {"benchmarks": code_digest(ROOT, ("benchmarks",))}
+    with ProgressLine() as line:
+        for study in studies:
+            file = FOLDER / name / f"{study.name.replace(', ', '-').replace(' ', '_')}.sqlite"
+            tell_of = partial(_tell, line, study, sum(map(len, results.values())), total)
+            target, n = Target(study.name, study.row, about), seeds * study.seed_factor
+            try:
+                found = _swept(target, n, file, jobs, tell_of, fresh=not resume)
+            except ConfigError as error:
+                raise ConfigError(f"{error}; run without --resume to begin anew") from error
+            trials = {int(row[SEED]): study.result_of(row) for row in found.rows}
+            lost = {seed: TrialResult(reason=why) for seed, why in found.failures.items()}
+            results[study.name] = dict(sorted((trials | lost).items()))
     return results
+
+
+def _tell(line: ProgressLine, study: Study, before: int, total: int, progress: Progress) -> None:
+    """How far all has come, and what came of a trial; a bug ends it."""
+    done, failure = before + progress.done, progress.failure
+    if progress.seed is None:
+        line.update(done / total, f"{study.name}, starting")
+        if progress.done:
+            print(f"{progress.done} finished trials of {study.name} are kept", file=sys.stderr)
+        return
+    if failure is not None and not failure.has_died:
+        raise RuntimeError(f"{failure.text}\n{failure.details}")
+    result = study.result_of(progress.row) if progress.row else TrialResult()
+    failures = [f"{metric}: {why}" for metric, why in result.failures.items()]
+    told = failure.text if failure else result.reason or "; ".join(failures) or "ok"
+    place = f"{done}/{total} {study.name}, seed {progress.seed}"
+    line.done(f"{place}: {told}")
+    line.update(done / total, place)
 
 
 def run_sweep(
@@ -199,14 +224,24 @@ def run_sweep(
     Raises:
         ConfigError: if the folder of the rows cannot be made, or they depend on something else.
     """
-    rows = rows or store.FOLDER / f"{name}.sqlite"
+    with ProgressLine() as line:
+        rows = rows or FOLDER / f"{name}.sqlite"
+        return _swept(trial, n, rows, jobs, partial(tell, line), first_seed=first_seed)
+
+
+def _swept(
+    what: object,
+    n: int,
+    rows: Path,
+    jobs: int,
+    on_progress: Callable[[Progress], None],
+    **more: Any,  # noqa: ANN401
+) -> SweepResult:
     try:
         rows.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ConfigError(f"cannot make the folder of {rows}: {error.strerror}") from error
-    with ProgressLine() as line:
-        options = {"workers": jobs, "out": rows, "keep_going": True, "first_seed": first_seed}
-        return sweep(trial, n, **options, on_progress=lambda progress: tell(line, progress))
+    return sweep(what, n, workers=jobs, out=rows, keep_going=True, on_progress=on_progress, **more)
 
 
 def _print_list(studies: Sequence[Study]) -> None:

@@ -8,12 +8,13 @@ only, and of the test half no single motion is shown.
 
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache, partial
 from typing import Annotated
 
 from benchmarks.command import Jobs, Output, Resume, Sensors, measure_all, positive
 from benchmarks.robots import checker
-from benchmarks.study import IDEAL, Results, Study, Task, TrialResult
+from benchmarks.study import IDEAL, Results, Study, TrialResult
 from benchmarks.validation_set import questions as exam
 from benchmarks.validation_set.drawing import TEST
 from benchmarks.validation_set.physics import (
@@ -33,6 +34,7 @@ from benchmarks.validation_set.physics import (
 from benchmarks.validation_set.questions import Question, draw_name, draws
 from benchmarks.validation_set.scores import HALVES, Case, render, scores, wrong_ones
 from controller.motion_measurement import FELL
+from controller.sweeps.targets import digest
 from controller.sweeps.trials import Trial
 
 EXAM, DYNAMIC, REFUSED = "exam", "dynamic", "refused"
@@ -77,14 +79,13 @@ def run(
         return _bisect(measure, motions, output, remake=remake)
     if remake:
         print("--remake is for --borders: every motion is played, none is stored", file=sys.stderr)
-    asked, study = asked_of(rows), study_of(rows).on(sensors)
-    seeds = [n for n, one in enumerate(asked) if half in (None, one.family.half)][:motions]
-    found = measure([(study, seed) for seed in seeds])[study.name]
-    for seed in seeds:
-        if not found[seed].values:
-            print(f"{asked[seed].name}: no result, {found[seed].reason}", file=sys.stderr)
-    cases = [case_of(asked[seed], found[seed]) for seed in seeds if found[seed].values]
-    is_ok, verdict = (judged if rows == EXAM else judged_dynamic)(cases, len(seeds))
+    asked, study = asked_of(rows, half)[:motions], study_of(rows, half).on(sensors)
+    found = measure([study], len(asked))[study.name]
+    for seed, one in found.items():
+        if not one.values:
+            print(f"{asked[seed].name}: no result, {one.reason}", file=sys.stderr)
+    cases = [case_of(asked[seed], one) for seed, one in found.items() if one.values]
+    is_ok, verdict = (judged if rows == EXAM else judged_dynamic)(cases, len(asked))
     values = {"passed": is_ok, "scores": {n: s.as_dict() for n, s in scores(cases).items()}}
     more = {"wrong": wrong_ones(cases)} if wrong else {}
     text = "\n".join([render(cases), *more.get("wrong", ()), verdict])
@@ -92,14 +93,15 @@ def run(
 
 
 @cache
-def asked_of(rows: str) -> list[Question]:
-    """All motions of the exam, in their order; or dynamic ones only, those of the exam and more."""
-    return (exam.questions if rows == EXAM else exam.dynamic_questions)(read_borders())
+def asked_of(rows: str, half: str | None = None) -> list[Question]:
+    """All motions of the exam, or of a half; or dynamic ones only, those of the exam and more."""
+    asked = (exam.questions if rows == EXAM else exam.dynamic_questions)(read_borders())
+    return [one for one in asked if half in (None, one.family.half)]
 
 
-def ask(trial: Trial, found: TrialResult, of: str) -> None:
+def ask(trial: Trial, found: TrialResult, of: str, half: str | None) -> None:
     """Check the motion of that number and see what physics does; reasons are kept as notes."""
-    question, model = asked_of(of)[trial.seed], checker().model
+    question, model = asked_of(of, half)[trial.seed], checker().model
     plan = question.plan(model)
     report = checker().check(plan)
     outcome = verdicts_of(play(plan, model, question.draw, trial.sensors), plan)
@@ -110,15 +112,15 @@ def ask(trial: Trial, found: TrialResult, of: str) -> None:
     found.notes = {row: _BETWEEN.join(reason) for row, reason in reasons.items()}
 
 
-def study_of(of: str) -> Study:
+def study_of(of: str, half: str | None = None) -> Study:
     """The trials of these motions, with borders as they are now."""
     return Study(
-        f"{of} {borders_version()}",
+        " ".join(filter(None, (of, half, borders_version()))),
         {
             "verdict": ((REFUSED, "refused by the check", ""),),
             "physics": [(kind, f"went wrong, {kind}", "") for kind in OUTCOMES],
         },
-        partial(ask, of=of),
+        partial(ask, of=of, half=half),
         prefix="",
     )
 
@@ -156,8 +158,18 @@ def judged_dynamic(cases: Sequence[Case], asked: int) -> tuple[bool, str]:
     return is_ok, said + ("ok." if is_ok else "NO.")
 
 
+def _numbered(
+    trial: Trial,
+    found: TrialResult,
+    measure: Callable[[Trial, TrialResult], None],
+    numbers: Sequence[int],
+) -> None:
+    """Measure the trial whose seed has this place among ``numbers``."""
+    measure(replace(trial, seed=numbers[trial.seed]), found)
+
+
 def _bisect(
-    measure: Callable[[Sequence[Task]], Results],
+    measure: Callable[[Sequence[Study], int], Results],
     motions: int | None,
     output: Output,
     *,
@@ -167,10 +179,15 @@ def _bisect(
     kept = {} if remake or not BORDERS_FILE.exists() else read_borders()
     names = [draw_name(*draw) for draw in draws()]
     wanted = [seed for seed, name in enumerate(names) if name not in kept][:motions]
-    found = measure([(BORDERS, seed) for seed in wanted]) if wanted else {}
-    for seed, one in found.get(BORDERS.name, {}).items():
+    study = replace(
+        BORDERS,
+        name=f"{BORDERS.name} {digest(repr(wanted).encode())}",
+        measure=partial(_numbered, measure=BORDERS.measure, numbers=wanted),
+    )
+    found = measure([study], len(wanted))[study.name] if wanted else {}
+    for number, one in found.items():
         if one.values:
-            kept[names[seed]] = one.values.get(BORDER)
+            kept[names[wanted[number]]] = one.values.get(BORDER)
     write_borders({name: kept[name] for name in names if name in kept})
     none = sum(value is None for value in kept.values())
     text = f"{len(kept)} of {len(names)} borders, {none} beyond the bounds of their family"

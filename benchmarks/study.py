@@ -6,12 +6,14 @@ number only informs: ``"mm"``, or ``">= mm"`` where more is better. Names begin 
 
 from __future__ import annotations
 
+import json
+import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from controller.sweeps.engine import LocalEngine
+from controller.sweeps.sweep_file import Row
 from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
 
@@ -20,6 +22,7 @@ IDEAL, IMU = "ideal", "imu"
 SENSED = "sensed-"  # What names on the robot's own sensors begin with
 BAR = re.compile(r"(<=|>=)? ?(-?\d[-\d.e]*(?= |$))? ?(.*)")  # Side, threshold and unit
 Rows = Sequence[tuple[str, str, str]]  #: Name, quantity and bar
+_WORDS = ("failures", "notes")  # Of a trial, by row
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,9 +142,22 @@ class Study:
                 found.failures[self.done] = found.reason
         return found.named(self._prefix)
 
+    def row(self, seed: int) -> Row:
+        """The trial of a seed as the row of a sweep; nan is no value."""
+        found = self.run(seed)
+        values = {m.name: float(found.values.get(m.name, math.nan)) for m in self.metrics}
+        words = {name: json.dumps(getattr(found, name)) for name in _WORDS}
+        return {**values, "reason": found.reason, **words}
+
+    def result_of(self, row: Row) -> TrialResult:
+        """The trial that a row keeps."""
+        values = {m.name: float(row[m.name]) for m in self.metrics}
+        words = {name: json.loads(str(row[name])) for name in _WORDS}
+        known = {name: value for name, value in values.items() if not math.isnan(value)}
+        return TrialResult(known, reason=str(row["reason"]), **words)
+
 
 Results = dict[str, dict[int, TrialResult]]  #: What every trial gave, by study and seed
-Task = tuple[Study, int]  #: A study and the seed of one trial
 
 
 def chosen_studies(studies: Sequence[Study], names: Sequence[str]) -> tuple[Study, ...]:
@@ -155,25 +171,3 @@ def chosen_studies(studies: Sequence[Study], names: Sequence[str]) -> tuple[Stud
         if name not in valid:
             raise CommandError(unknown_name("scenario", name, valid))
     return tuple(s for s in studies if not names or s.name in names or s.group in names)
-
-
-def tasks_of(studies: Sequence[Study], seeds: int) -> list[Task]:
-    """Every study on its seeds 0, 1, ...; their number is multiplied by its factor."""
-    return [(s, seed) for s in studies for seed in range(seeds * s.seed_factor)]
-
-
-def run_tasks(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[Study, int, TrialResult]]:
-    """Study, seed and result of trials as they end, in the workers of a sweep, ``jobs`` at a time.
-
-    A process that dies costs no other trial its result. To be called from the main thread.
-    """
-    for ended in LocalEngine(jobs).run(_run_task, tasks):
-        failure = ended.failure
-        if failure is not None and not failure.has_died:
-            raise RuntimeError(f"{failure.text}\n{failure.details}")
-        yield *ended.item, ended.value or TrialResult(reason="its process died twice")
-
-
-def _run_task(task: Task) -> TrialResult:
-    study, seed = task
-    return study.run(seed)

@@ -33,6 +33,8 @@ class Progress:
     total: int  #: seeds that were asked for
     rate: float  #: seeds a second, in this run
     failure: Failure | None = None  #: why the seed that ended last has no row, or None
+    seed: int | None = None  #: that one; None before any has ended
+    row: Row | None = None  #: what it gave, or None
 
     @property
     def share(self) -> float:
@@ -128,7 +130,8 @@ def sweep(
                     if not keep_going:
                         raise SweepError(_told(ended.item, ended.failure, rows))
                 rate = count / max(time.monotonic() - start, math.ulp(1.0))
-                on_progress(Progress(n - len(left) + count, n, rate, ended.failure))
+                told = ended.failure, ended.item, ended.value
+                on_progress(Progress(n - len(left) + count, n, rate, *told))
                 if are_enough := _are_enough(first, seeds, known, is_enough):
                     break
         return _result(rows, seeds[: len(first)] if are_enough else seeds)

@@ -1,22 +1,34 @@
 """Benchmarks under test run in this process and write where the test says."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 
-from benchmarks import behaviour, command, store
+from benchmarks import behaviour, command
 from benchmarks.study import Study
+from controller.sweeps.engine import Ended, Ends, Engine, Item
+from controller.sweeps.targets import Job
 
 Only = Callable[[Study], None]
+
+
+class Here(Engine):
+    """Runs all in this process, where its function may be anything."""
+
+    def run(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Ends[Item]:
+        assert isinstance(function, Job)
+        for item in items:
+            yield Ended(item, function.function(cast("int", item)))
 
 
 @pytest.fixture
 def results_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """Where the finished trials are kept during a test."""
     folder = tmp_path / "benchmarks"
-    monkeypatch.setattr(store, "FOLDER", folder)
+    monkeypatch.setattr(command, "FOLDER", folder)
     return folder
 
 
@@ -26,8 +38,6 @@ def only(monkeypatch: pytest.MonkeyPatch, results_folder: Path) -> Only:
 
     def install(study: Study) -> None:
         monkeypatch.setattr(behaviour, "run", replace(behaviour.BENCHMARK, studies=(study,)).run)
-        monkeypatch.setattr(
-            command, "run_tasks", lambda tasks, _jobs: ((s, seed, s.run(seed)) for s, seed in tasks)
-        )
+        monkeypatch.setattr("controller.sweeps.run.LocalEngine", lambda _workers: Here())
 
     return install

@@ -91,7 +91,7 @@ def test_the_command_reports_and_writes_scores_and_no_motion_of_the_test_half(
     assert main([*arguments, "--resume"]) == ExitCode.OK
     again = capsys.readouterr()
     assert json.loads(again.out) == printed
-    assert f"{COUNT} finished trials are taken" in again.err
+    assert f"{COUNT} finished trials of exam" in again.err
 
 
 def test_dynamic_motions_of_one_half_are_asked_by_themselves(

@@ -1,11 +1,13 @@
 """Every trial is run once, in whatever process, and one that dies costs no other its result."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+from benchmarks.command import measure_all
 from benchmarks.report import summarise
-from benchmarks.study import Results, Study, TrialResult, run_tasks, tasks_of
+from benchmarks.study import Results, Study, TrialResult
 from controller.sweeps.trials import Trial, TrialFailed
 from tests.benchmarks.support import (
     TABLE,
@@ -18,14 +20,8 @@ from tests.benchmarks.support import (
 )
 
 
-def results_of(*scenarios: Study, seeds: int, jobs: int = 0) -> Results:
-    results: Results = {scenario.name: {} for scenario in scenarios}
-    tasks = tasks_of(scenarios, seeds)
-    here = ((study, seed, study.run(seed)) for study, seed in tasks)
-    for scenario, seed, measurement in run_tasks(tasks, jobs) if jobs else here:
-        assert seed not in results[scenario.name]
-        results[scenario.name][seed] = measurement
-    return results
+def results_of(*studies: Study, seeds: int) -> Results:
+    return {study.name: {seed: study.run(seed) for seed in range(seeds)} for study in studies}
 
 
 def fall(_trial: Trial, found: TrialResult) -> None:
@@ -59,19 +55,26 @@ def test_a_bug_is_raised_and_not_counted() -> None:
         results_of(fake(have_a_bug), seeds=1)
 
 
-def test_every_seed_is_run_once_in_processes_as_one_after_the_other() -> None:
+def test_every_seed_is_run_once_in_processes_as_one_after_the_other(results_folder: Path) -> None:
     more = Study("more", TABLE, measure_badly, seed_factor=2)
-    results = results_of(fake(), more, seeds=2)
-    assert {name: sorted(trials) for name, trials in results.items()} == {
+    results = measure_all("any", [fake(), more], 2, jobs=2, resume=False)
+    assert {name: list(trials) for name, trials in results.items()} == {
         "fake": [0, 1],
         "more": [0, 1, 2, 3],
     }
-    assert results_of(fake(), seeds=3, jobs=2) == results_of(fake(), seeds=3)
+    assert results["fake"] == results_of(fake(), seeds=2)["fake"]
 
 
-def test_a_process_that_dies_fails_its_own_trial_only() -> None:
-    results = results_of(fake(die_on_seed_1), seeds=4, jobs=2)["fake"]
-    assert {seed: trial.reason for seed, trial in results.items()} == {
-        **dict.fromkeys((0, 2, 3), ""),
-        1: "its process died twice",
-    }
+def test_a_process_that_dies_fails_its_own_trial_only(
+    results_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    results = measure_all("any", [fake(die_on_seed_1)], 4, jobs=2, resume=False)["fake"]
+    reasons = {seed: trial.reason for seed, trial in results.items()}
+    assert "its process died 2 times" in reasons.pop(1)
+    assert reasons == dict.fromkeys((0, 2, 3), "")
+    assert "fake, seed 1: its process died 2 times" in capsys.readouterr().err
+
+
+def test_a_bug_in_a_process_ends_the_run_with_its_traceback(results_folder: Path) -> None:
+    with pytest.raises(RuntimeError, match=r"ZeroDivisionError: a bug[\s\S]*in have_a_bug"):
+        measure_all("any", [fake(have_a_bug)], 2, jobs=1, resume=False)

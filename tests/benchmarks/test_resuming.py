@@ -1,18 +1,19 @@
 """An interrupted run goes on where it ended; what does not fit is refused."""
 
 import math
+import re
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from benchmarks import command
 from benchmarks.__main__ import main
-from benchmarks.store import file_of, opened, settings_header
 from benchmarks.study import Study, TrialResult
 from controller.cli.common import ExitCode
 from controller.sweeps.run import read_sweep
-from controller.sweeps.trials import Trial
-from go2_wbc.errors import ConfigError
+from controller.sweeps.trials import Trial, TrialFailed
 from tests.benchmarks.conftest import Only
 from tests.benchmarks.support import fake, measure_well
 
@@ -34,15 +35,6 @@ class Interrupted:
         measure_well(trial, found)
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """Two trials of a run that has ended."""
-    with opened(tmp_path, [TROT], resume=False) as store:
-        store.add(TROT, 0, FIRST)
-        store.add(TROT, 7, SECOND)
-    return tmp_path
-
-
 def test_an_interrupted_run_goes_on_with_what_is_left(
     only: Only, capsys: pytest.CaptureFixture[str], results_folder: Path
 ) -> None:
@@ -58,7 +50,7 @@ def test_an_interrupted_run_goes_on_with_what_is_left(
     told = capsys.readouterr()
     assert (first.seeds, second.seeds) == ([0, 1], [2, 3])
     assert told.out == expected
-    assert "2 finished trials are taken from" in told.err
+    assert "2 finished trials of fake are kept" in told.err
     assert "3/4 fake, seed 2: ok" in told.err
     assert [path.name for path in results_folder.rglob("*.sqlite")] == ["fake.sqlite"]
 
@@ -76,52 +68,45 @@ def test_more_seeds_only_add_to_what_is_there_and_without_resume_all_is_measured
 
 
 def test_trials_come_back_to_the_last_bit_as_rows_that_say_what_they_depend_on(
-    folder: Path,
+    only: Only, results_folder: Path
 ) -> None:
-    with opened(folder, [TROT], resume=True) as store:
-        found = store.finished
-    assert set(found) == {("trot", 0), ("trot", 7)}
-    assert found["trot", 0] == FIRST
-    assert found["trot", 7] == replace(SECOND, values={"b": 0.0}), "nan is no value"
-    assert math.copysign(1.0, found["trot", 7].values["b"]) == -1.0
-    kept = read_sweep(file_of(folder, TROT))
-    assert kept.about == {"what": "trot", **settings_header()}
-    assert set(kept.about) == {"what", "version", "python", "libraries", "settings", "code"}
-    assert kept.rows[0]["a"] == 0.1 + 0.2
+    for found in (FIRST, SECOND):
+        only(replace(TROT, measure=partial(give, found)))
+        main(["behaviour", "--seeds", "1"])
+        kept = read_sweep(results_folder / "behaviour" / "trot.sqlite")
+        (row,) = kept.rows
+        values = {name: value for name, value in found.values.items() if not math.isnan(value)}
+        assert TROT.result_of(row) == replace(found, values=values), "nan is no value"
+    assert math.copysign(1.0, float(row["b"])) == -1.0
+    about = {"what", "version", "python", "libraries", "benchmarks", "code"}
+    assert (set(kept.about), kept.about["what"]) == (about, "trot")
 
 
-@pytest.mark.parametrize("name", ["version", "python", "settings", "code"])
-def test_trials_under_other_settings_are_refused_with_what_differs(
-    folder: Path, name: str, monkeypatch: pytest.MonkeyPatch
+def give(given: TrialResult, _trial: Trial, found: TrialResult) -> None:
+    found.values, found.failures, found.notes = given.values, given.failures, given.notes
+    if given.reason:
+        raise TrialFailed(given.reason)
+
+
+def test_trials_of_other_code_are_refused_with_what_differs(
+    only: Only, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    other = {**settings_header(), name: "another"}
-    monkeypatch.setattr("benchmarks.store.settings_header", lambda: other)
-    with (
-        pytest.raises(ConfigError, match=rf"{name} .*now another.*without --resume"),
-        opened(folder, [TROT], resume=True),
-    ):
-        pass
+    only(fake())
+    main(["behaviour", "--seeds", "1"])
+    monkeypatch.setattr(command, "code_digest", lambda *_: "another")
+    capsys.readouterr()
+    assert main(["behaviour", "--seeds", "2", "--resume"]) == ExitCode.USAGE
+    assert re.search("benchmarks .*now another.*without --resume", capsys.readouterr().err)
 
 
-def test_a_file_of_something_else_is_neither_read_nor_removed(tmp_path: Path) -> None:
-    file_of(tmp_path, TROT).write_text("notes")
-    for resume in (True, False):
-        with (
-            pytest.raises(ConfigError, match="no database"),
-            opened(tmp_path, [TROT], resume=resume),
-        ):
-            pass
-    assert file_of(tmp_path, TROT).read_text() == "notes"
-
-
-def test_a_changed_line_of_code_changes_the_settings(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("words", [["--resume"], []])
+def test_a_file_of_something_else_is_neither_read_nor_removed(
+    only: Only, results_folder: Path, words: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "controller").mkdir()
-    file = tmp_path / "controller" / "gain.py"
-    monkeypatch.setattr("benchmarks.store.ROOT", tmp_path)
-    codes = []
-    for text in ("GAIN = 1.0", "GAIN = 2.0", "GAIN = 1.0"):
-        file.write_text(text)
-        codes.append(settings_header()["code"])
-    assert codes[0] == codes[2] != codes[1]
+    only(fake())
+    file = results_folder / "behaviour" / "fake.sqlite"
+    file.parent.mkdir(parents=True)
+    file.write_text("notes")
+    assert main(["behaviour", *words]) == ExitCode.USAGE
+    assert "no database" in capsys.readouterr().err
+    assert file.read_text() == "notes"
