@@ -109,8 +109,9 @@ class GO2Controller:
             )
             opened.callback(self._pilot.close)
             self._resources = opened.pop_all()
-        self._runner, self._description = self._pilot.runner, description
-        self._motor, self._limits = config.motor, config.feasibility
+        self._runner, self._limits = self._pilot.runner, config.feasibility
+        self._model = RobotModel(description, motor=config.motor)
+        """For planning: the control loop's own belongs to the thread that ticks."""
         self._closed, self._clipped, self._planning = False, LogOnce(_log), threading.Lock()
         self._turn: dict[str, Call] = {}  # what runs: one entry, or none
         self._last = Outcome(True, "lying, nothing asked yet", 0.0)
@@ -253,13 +254,13 @@ class GO2Controller:
             CommandError: for another side or time.
         """
         if plan is None:
-            own = self._description.profile.motions.get("high_five", {})
+            own = self._model.profile.motions.get("high_five", {})
             try:
                 timeline = motions.load_motion("high_five", side=side, hold=hold, **own)
             except TimelineError as error:
                 raise CommandError(str(error)) from None
             with self._planning:
-                plan = motions.compile_timeline(timeline, self._checker.model)
+                plan = motions.compile_timeline(timeline, self._model)
         return self._call("high_five", lambda: self._pilot.play(plan, stands_up=True))
 
     @typed("times", "check", "allow_dynamic", error=CommandError)
@@ -333,9 +334,7 @@ class GO2Controller:
 
     @cached_property
     def _checker(self) -> motions.FeasibilityChecker:
-        """Plans on a model of its own: the control loop's belongs to the thread that ticks."""
-        model = RobotModel(self._description, motor=self._motor)
-        return motions.FeasibilityChecker(model, self._limits)
+        return motions.FeasibilityChecker(self._model, self._limits)
 
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does.

@@ -47,6 +47,7 @@ def test_a_motion_that_is_cancelled_before_it_begins_is_not_played(
     plant.once_at(1.0, go2.cancel)
     assert go2.high_five() is False
     assert "before it began" in go2.last_outcome.reason
+    assert "_checker" not in vars(go2), "it ships checked: nothing of the check is loaded for it"
     assert go2.mode is Mode.STANDING
     assert go2.progress == 0.0
 

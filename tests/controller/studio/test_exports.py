@@ -95,7 +95,7 @@ def test_what_is_told_of_a_plan_for_a_bridge_is_a_command_that_takes_it(
         assert main(arguments) == 0
     saved, *driven = seen
     assert isinstance(saved, SavedMotions)
-    assert saved.read("nod.ros2.plan").name == "nod"
+    assert load_plan(saved.file("nod.ros2.plan")).name == "nod"
     assert driven == [["stand", "nod.unitree.plan", "lie_down"], ("lo", 1)]
 
 
