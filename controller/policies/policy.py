@@ -27,58 +27,6 @@ NOWHERE = np.zeros(12)
 NOWHERE.flags.writeable = False
 
 
-class Observer:
-    """Makes observations of states, one each period of the policy.
-
-    Attributes:
-        action: of the last period; the network's own numbers.
-        phase: of a stride, of each term that is one, 0 to 1.
-    """
-
-    def __init__(self, sidecar: Sidecar) -> None:
-        """Observe as ``sidecar`` says, from phase 0 on."""
-        self._sidecar = sidecar
-        self.restart()
-
-    def restart(self, phase: float = 0.0) -> None:
-        """Forget all, and begin at ``phase`` of the stride."""
-        self.action = np.zeros(12)
-        self.phase = np.full(len(self._sidecar.terms), phase)
-        self._rows: Float[np.ndarray, "h n"] | None = None
-
-    def observe(self, state: RobotState, command: VelocityCommand) -> Float[np.ndarray, " n"]:
-        """The observation of this period; at first its history is the same row again and again."""
-        row = self._row(state, command)
-        before = self._rows
-        repeated = np.tile(row, (self._sidecar.history, 1))
-        self._rows = repeated if before is None else np.vstack([before[1:], row])
-        rows = self._rows if self._sidecar.oldest_first else self._rows[::-1]
-        if not self._sidecar.by_terms:
-            return rows.ravel()
-        ends = np.cumsum([len(term.scale) for term in self._sidecar.terms])[:-1]
-        return np.concatenate([part.ravel() for part in np.split(rows, ends, axis=1)])
-
-    def _row(self, state: RobotState, command: VelocityCommand) -> Float[np.ndarray, " n"]:
-        side, parts = self._sidecar, []
-        seen = sensed(state)
-        values = {
-            **seen,
-            "command": np.array([command.linear_x, command.linear_y, command.angular_z]),
-            "joint_positions": side.signs * seen["joint_positions"][side.order] - side.default,
-            "joint_velocities": side.signs * seen["joint_velocities"][side.order],
-            "last_action": self.action,
-        }
-        for i, term in enumerate(side.terms):
-            if term.frequency:
-                angles = 2.0 * np.pi * (self.phase[i] + np.array(term.offsets))
-                value = np.column_stack([np.sin(angles), np.cos(angles)]).ravel()
-                self.phase[i] = (self.phase[i] + term.frequency / side.rate) % 1.0
-            else:
-                value = values[term.name]
-            parts.append(term.scale * value)
-        return np.clip(np.concatenate(parts), -side.observation_clip, side.observation_clip)
-
-
 class Policy:
     """A network and what its numbers mean.
 
@@ -138,25 +86,28 @@ class Policy:
 
 
 class Player:
-    """Plays a policy: asked every tick, it lets the policy act at its own rate.
+    """Plays a policy: asked every tick, it lets the policy see and act at its own rate.
 
     Attributes:
         policy: what is played.
-        observer: of what it sees.
         observation: the last one.
+        action: of the last period; the network's own numbers.
+        phase: of a stride, of each term that is one, 0 to 1.
     """
 
     def __init__(self, policy: Policy, lower: Array12, upper: Array12) -> None:
         """Play ``policy``; its targets are kept within these joint angles [rad]."""
         self.policy, self._lower, self._upper = policy, lower, upper
-        self.observer = Observer(policy.sidecar)
+        self._sidecar = policy.sidecar
         order = np.argsort(policy.sidecar.order)
         self._gains = policy.sidecar.kp[order], policy.sidecar.kd[order]
         self.restart(0.0)
 
     def restart(self, phase: float) -> None:
-        """Begin anew at ``phase`` of the stride."""
-        self.observer.restart(phase)
+        """Forget all, and begin anew at ``phase`` of the stride."""
+        self.action = np.zeros(12)
+        self.phase = np.full(len(self._sidecar.terms), phase)
+        self._rows: Float[np.ndarray, "h n"] | None = None
         self._next, self._targets, self.observation = -np.inf, NOWHERE, NOWHERE
 
     def command(self, state: RobotState, command: VelocityCommand = ZERO_COMMAND) -> JointCommand:
@@ -169,10 +120,42 @@ class Player:
         if state.time >= self._next - 1e-6:
             is_late = state.time - self._next > 0.5 * period
             self._next = period + (state.time if is_late else self._next)
-            self.observation = self.observer.observe(state, command)
-            self.observer.action = action = self.policy.act(self.observation)
-            self._targets = np.clip(self.policy.targets(action), self._lower, self._upper)
+            self.observation = self.observe(state, command)
+            self.action = self.policy.act(self.observation)
+            self._targets = np.clip(self.policy.targets(self.action), self._lower, self._upper)
         return JointCommand(NOWHERE, self._targets, NOWHERE, *self._gains)
+
+    def observe(self, state: RobotState, command: VelocityCommand) -> Float[np.ndarray, " n"]:
+        """The observation of this period; at first its history is the same row again and again."""
+        row = self._row(state, command)
+        before = self._rows
+        repeated = np.tile(row, (self._sidecar.history, 1))
+        self._rows = repeated if before is None else np.vstack([before[1:], row])
+        rows = self._rows if self._sidecar.oldest_first else self._rows[::-1]
+        if not self._sidecar.by_terms:
+            return rows.ravel()
+        ends = np.cumsum([len(term.scale) for term in self._sidecar.terms])[:-1]
+        return np.concatenate([part.ravel() for part in np.split(rows, ends, axis=1)])
+
+    def _row(self, state: RobotState, command: VelocityCommand) -> Float[np.ndarray, " n"]:
+        side, parts = self._sidecar, []
+        seen = sensed(state)
+        values = {
+            **seen,
+            "command": np.array([command.linear_x, command.linear_y, command.angular_z]),
+            "joint_positions": side.signs * seen["joint_positions"][side.order] - side.default,
+            "joint_velocities": side.signs * seen["joint_velocities"][side.order],
+            "last_action": self.action,
+        }
+        for i, term in enumerate(side.terms):
+            if term.frequency:
+                angles = 2.0 * np.pi * (self.phase[i] + np.array(term.offsets))
+                value = np.column_stack([np.sin(angles), np.cos(angles)]).ravel()
+                self.phase[i] = (self.phase[i] + term.frequency / side.rate) % 1.0
+            else:
+                value = values[term.name]
+            parts.append(term.scale * value)
+        return np.clip(np.concatenate(parts), -side.observation_clip, side.observation_clip)
 
 
 def _network(path: Path, size: int) -> Network:

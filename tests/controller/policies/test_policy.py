@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.policies import laid_out
 from controller.policies import TROT, Policy, Sidecar
-from controller.policies.policy import Observer, Player
+from controller.policies.policy import Player
 from go2_wbc.errors import MissingDependency, PolicyError
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.robot.model import RobotModel
@@ -27,6 +27,11 @@ def linear(seed: int, side: Sidecar = SIDECAR) -> Policy:
     """A policy that is any linear function."""
     W = np.random.default_rng(seed).normal(scale=0.1, size=(12, side.observation_size))
     return Policy("linear", side, lambda x: W @ x)
+
+
+def seeing(side: Sidecar) -> Player:
+    """One that is asked for observations only."""
+    return Player(linear(0, side), -WIDE, WIDE)
 
 
 def states(n: int) -> list[RobotState]:
@@ -53,7 +58,7 @@ def test_a_policy_does_the_same_in_another_order_with_other_signs_and_scales(
 
 
 def test_an_observation_holds_each_term_by_its_meaning() -> None:
-    state, observer = states(1)[0], Observer(replace(SIDECAR, order=ISAAC_LAB))
+    state, observer = states(1)[0], seeing(replace(SIDECAR, order=ISAAC_LAB))
     observer.restart(0.3)
     observer.action = np.arange(12).astype(float)
     row = observer.observe(state, COMMAND)
@@ -71,7 +76,7 @@ def test_an_observation_holds_each_term_by_its_meaning() -> None:
 
 def test_the_clock_goes_on_with_its_frequency_and_has_a_sine_and_cosine_for_each_offset() -> None:
     term = replace(SIDECAR.terms[-1], offsets=(0.0, 0.5), scale=np.ones(4))
-    observer = Observer(replace(SIDECAR, terms=(term,)))
+    observer = seeing(replace(SIDECAR, terms=(term,)))
     first, second = (observer.observe(state, COMMAND) for state in states(2))
     np.testing.assert_allclose(first, [0.0, 1.0, 0.0, -1.0], atol=ROUNDING)
     turn = 2.0 * np.pi * 2.5 / 50.0
@@ -83,7 +88,7 @@ def test_the_clock_goes_on_with_its_frequency_and_has_a_sine_and_cosine_for_each
 @pytest.mark.parametrize("by_terms", [True, False])
 def test_a_history_stands_as_the_sidecar_says(by_terms: bool, oldest_first: bool) -> None:
     side = replace(SIDECAR, history=3, by_terms=by_terms, oldest_first=oldest_first)
-    single, observer = Observer(SIDECAR), Observer(side)
+    single, observer = seeing(SIDECAR), seeing(side)
     rows = [single.observe(state, COMMAND) for state in states(4)]
     seen = [observer.observe(state, COMMAND) for state in states(4)]
     ends = np.cumsum([len(term.scale) for term in SIDECAR.terms])[:-1]
@@ -97,7 +102,7 @@ def test_a_history_stands_as_the_sidecar_says(by_terms: bool, oldest_first: bool
 
 def test_what_goes_in_and_comes_out_is_clipped() -> None:
     side = replace(SIDECAR, observation_clip=0.5, action_clip=0.2)
-    assert np.abs(Observer(side).observe(states(1)[0], COMMAND)).max() == 0.5
+    assert np.abs(seeing(side).observe(states(1)[0], COMMAND)).max() == 0.5
     assert np.abs(linear(1, side).act(np.full(side.observation_size, 10.0))).max() == 0.2
 
 
