@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.robots import checker
 from benchmarks.validation_set.drawing import TEST, TRAIN
-from benchmarks.validation_set.physics import get_ready, play, read_borders
+from benchmarks.validation_set.physics import play, read_borders
 from benchmarks.validation_set.questions import IMPOSSIBLE, Question, questions
 from benchmarks.validation_set.random_timelines import RandomTimeline, random_timelines
 from controller.motion_measurement import FELL, failures_of, measure_motion
@@ -93,7 +93,7 @@ def played(plan: MotionPlan, world: World, seed: int) -> tuple[str, ...]:
     """What went wrong, strictly, in a sample of ``world``; nothing if it was done."""
     with TrialRobot(plant_in_world(world, seed=seed)) as robot:
         try:
-            get_ready(robot, plan)
+            robot.get_ready(plan.entry)
         except (TrialFailed, Go2WbcError):
             return (NOT_READY,)
         return failures_of(measure_motion(robot.go2, robot.truth, plan, checker().model), plan)

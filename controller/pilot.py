@@ -72,7 +72,7 @@ class Pilot:
     @property
     def command(self) -> VelocityCommand:
         """The velocity command that is being followed."""
-        return self._walker.command if self.mode is Mode.WALKING else ZERO_COMMAND
+        return self._walker.walking.command if self.mode is Mode.WALKING else ZERO_COMMAND
 
     @property
     def terrain(self) -> SeenTerrain | None:

@@ -45,11 +45,6 @@ class Walker:
         learned = self.walking.learned
         return learned.policy if learned is not None and learned.is_wanted else None
 
-    @property
-    def command(self) -> VelocityCommand:
-        """The velocity that is followed."""
-        return self.walking.command
-
     def require(self, gait: str | Gait) -> None:
         """Raise CommandError for a gait that there is not."""
         if gait != AUTO and not isinstance(gait, Gait) and gait not in GAITS:

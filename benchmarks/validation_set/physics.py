@@ -25,7 +25,7 @@ from controller.motion_measurement import (
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import write_atomically
-from go2_wbc.motion_plan import MotionPlan, Posture
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 
@@ -94,15 +94,8 @@ def play(
         TrialFailed: if the robot does not get ready.
     """
     with TrialRobot(MujocoPlant(friction=FRICTION, seed=seed, sensors=sensors)) as robot:
-        get_ready(robot, plan)
+        robot.get_ready(plan.entry)
         return measure_motion(robot.go2, robot.truth, plan, model)
-
-
-def get_ready(robot: TrialRobot, plan: MotionPlan) -> None:
-    """Take the posture in which a plan begins; raises ``TrialFailed`` if that is not done."""
-    robot.require(robot.go2.stand())
-    if plan.entry is Posture.SIT:
-        robot.require(robot.go2.sit())
 
 
 def is_done(question: Question) -> bool:

@@ -275,37 +275,31 @@ def anchor_of(
     return Anchor(anchor.p_world + np.array([*moved, 0.0]), anchor.yaw)
 
 
-@dataclass(frozen=True, slots=True)
-class Approach:
-    """The way from where the robot stands to a dynamic plan, by minimum jerk.
+def offset_of(plan: MotionPlan, anchor: Anchor, snapshot: Snapshot) -> Float[np.ndarray, "3"]:
+    """Place [m] of the tracked point from its planned one, in the motion's frame.
 
-    Feedback alone comes near in half a second; a plan that flies or balances before is met so.
+    Of a plan that is not dynamic zero: feedback alone comes near in half a second.
     """
+    if not plan.has_dynamic_spans:
+        return np.zeros(3)
+    body = plan.at(0.0).body
+    p = tracked_position(snapshot, body.point) - anchor.p_world
+    return yaw_rotation(anchor.yaw).T @ p - body.p_world
 
-    p_start: Float[np.ndarray, "3"]
-    """(3,) place [m] of the tracked point from its planned one, in the motion's frame."""
 
-    @staticmethod
-    def of(plan: MotionPlan, anchor: Anchor, snapshot: Snapshot) -> Approach:
-        """From where the robot stands; none for a plan that is not dynamic."""
-        if not plan.has_dynamic_spans:
-            return Approach(np.zeros(3))
-        body = plan.at(0.0).body
-        seen = yaw_rotation(anchor.yaw).T @ (
-            tracked_position(snapshot, body.point) - anchor.p_world
-        )
-        return Approach(seen - body.p_world)
+def approach(target: Target, p_start: Float[np.ndarray, "3"], t: float) -> None:
+    """Let a plan's target ``t`` seconds into it begin at the offset ``p_start``, by minimum jerk.
 
-    def add_to(self, target: Target, t: float) -> None:
-        """Add what is left of the way ``t`` seconds into the plan to its target of that instant."""
-        if t >= APPROACH or not self.p_start.any():
-            return
-        values = Ease.MINIMUM_JERK.progress(t / APPROACH)
-        derivatives = target.p_world, target.v_world, target.a_world
-        for power, derivative in enumerate(derivatives):
-            share = values[power] / APPROACH**power
-            left = 1.0 - share if power == 0 else -share
-            derivative += left * self.p_start
+    So a plan is met that flies or balances before feedback could come near.
+    """
+    if t >= APPROACH or not p_start.any():
+        return
+    values = Ease.MINIMUM_JERK.progress(t / APPROACH)
+    derivatives = target.p_world, target.v_world, target.a_world
+    for power, derivative in enumerate(derivatives):
+        share = values[power] / APPROACH**power
+        left = 1.0 - share if power == 0 else -share
+        derivative += left * p_start
 
 
 def _pairs(plan: MotionPlan) -> list[list[Leg]]:
@@ -336,7 +330,7 @@ class PlayPlan(Behaviour):
     is_firm = True  #: Whether the trunk is held to the plan against the friction of the joints
     _anchor: Anchor
     _tracker: PlanTracker
-    _approach: Approach
+    _p_start: Float[np.ndarray, "3"]
     _weight: FeltWeight
 
     def __init__(self, plan: MotionPlan, friction: JointFriction | None = None) -> None:
@@ -354,7 +348,7 @@ class PlayPlan(Behaviour):
         self._last = self._start
         self._anchor = anchor_of(self.plan, snapshot.p_world_feet, snapshot.foot_radius)
         self._tracker = PlanTracker(self._anchor, self.plan.footsteps, is_firm=self.is_firm)
-        self._approach = Approach.of(self.plan, self._anchor, snapshot)
+        self._p_start = offset_of(self.plan, self._anchor, snapshot)
         self._weight = FeltWeight(self._friction)
 
     def return_safely(self) -> None:
@@ -415,7 +409,7 @@ class PlayPlan(Behaviour):
             return target, self._return.t
         t = now - self._start
         target = Target.of(self.plan.row_at(t))
-        self._approach.add_to(target, t)
+        approach(target, self._p_start, t)
         if self.is_dynamic:
             self._weight.add_to(target, snapshot, now - self._last)
         return target, t

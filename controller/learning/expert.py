@@ -22,7 +22,6 @@ from controller.observation import KD, KP, OBSERVATION, RATE, TARGETS, Actuation
 from controller.sweeps.motion_study import plan_of
 from controller.sweeps.trials import TrialFailed, TrialRobot
 from go2_wbc.contacts import find_gait
-from go2_wbc.motion_plan import Posture
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.recording import Recording
@@ -89,7 +88,7 @@ class Expert:
         go2, told = robot.go2, [(-math.inf, 0.0, 0.0, 0.0)]
         if self.archive:
             plan = plan_of(self.archive)
-            robot.require(go2.sit() if plan.entry is Posture.SIT else go2.stand())
+            robot.get_ready(plan.entry)
             robot.truth.clear()
             go2.play(plan, check=False, allow_dynamic=True)
             return told, math.nan, robot.truth.fall() is not None

@@ -16,7 +16,6 @@ from controller.report_view import performed
 from controller.sweeps.sweep_file import SEED, Row, SweepFile
 from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, TrialFailed, TrialRobot
 from go2_wbc.errors import CommandError, Go2WbcError
-from go2_wbc.motion_plan import Posture
 from go2_wbc.plant import MujocoPlant, plant_in_world
 from go2_wbc.world import World
 from motions import CompiledPlan, FeasibilityChecker, load_plan, save_plan
@@ -77,9 +76,9 @@ class MotionStudy:
         return world, plant
 
     def _played(self, robot: TrialRobot) -> MotionMeasurement:
-        plan, go2 = plan_of(self.archive), robot.go2
-        robot.require(go2.sit() if plan.entry is Posture.SIT else go2.stand())
-        return measure_motion(go2, robot.truth, plan, robot.model)
+        plan = plan_of(self.archive)
+        robot.get_ready(plan.entry)
+        return measure_motion(robot.go2, robot.truth, plan, robot.model)
 
 
 _NOTHING = MotionMeasurement(

@@ -20,6 +20,7 @@ from controller.sweeps.sweep_file import Row, Value
 from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS
 from go2_wbc.errors import Go2WbcError
+from go2_wbc.motion_plan import Posture
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
@@ -120,6 +121,10 @@ class TrialRobot:
         reason = self.truth.fall() if ok else self.go2.last_outcome.reason
         if reason is not None:
             raise TrialFailed(reason)
+
+    def get_ready(self, posture: Posture) -> None:
+        """Sit, where a motion begins so, or else stand; raises as ``require``."""
+        self.require(self.go2.sit() if posture is Posture.SIT else self.go2.stand())
 
     def wait(self, seconds: float) -> None:
         """Let time pass.

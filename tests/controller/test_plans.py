@@ -11,9 +11,10 @@ from controller.behaviours.plans import (
     APPROACH,
     FARTHEST,
     LEAST_WEIGHT,
-    Approach,
     FeltWeight,
     anchor_of,
+    approach,
+    offset_of,
     vertical_force,
 )
 from go2_wbc.legs import Leg
@@ -82,8 +83,8 @@ def test_what_never_stands_on_two_feet_is_played_in_the_frame_of_the_feet(
     np.testing.assert_array_equal(anchor.p_world, of_feet.p_world)
 
 
-def approach_from(model: RobotModel, plan: MotionPlan) -> tuple[Approach, Float[np.ndarray, "3"]]:
-    """The approach of a robot that stands anywhere, and how far its CoM is from its place."""
+def offset_from(model: RobotModel, plan: MotionPlan) -> tuple[Float[np.ndarray, "3"], ...]:
+    """The offset of a robot that stands anywhere, and how far its CoM is from its place."""
     anchor = Anchor(np.array([0.1, 0.2, 0.0]), 0.4)
     q = np.array([0.1, 0.21, 0.3, 0.0, 0.0, np.sin(0.2), np.cos(0.2), *[0.0, 0.8, -1.6] * 4])
     still, off = np.zeros(12), np.zeros(4)
@@ -91,15 +92,15 @@ def approach_from(model: RobotModel, plan: MotionPlan) -> tuple[Approach, Float[
     snapshot = model.snapshot(state)
     wanted = plan.at(0.0).placed(anchor).body.p_world
     away = yaw_rotation(anchor.yaw).T @ (snapshot.p_world_com - wanted)
-    return Approach.of(plan, anchor, snapshot), away
+    return offset_of(plan, anchor, snapshot), away
 
 
 def test_the_approach_leads_from_the_robot_to_the_plan(model: RobotModel, pair: MotionPlan) -> None:
-    approach, away = approach_from(model, pair)
+    p_start, away = offset_from(model, pair)
 
     def added(t: float) -> list[Float[np.ndarray, "3"]]:
         target = Target()
-        approach.add_to(target, t)
+        approach(target, p_start, t)
         return [target.p_world, target.v_world, target.a_world]
 
     np.testing.assert_allclose(added(0.0)[0], away, atol=1e-12)
@@ -112,8 +113,8 @@ def test_the_approach_leads_from_the_robot_to_the_plan(model: RobotModel, pair: 
 
 
 def test_a_motion_that_is_not_dynamic_is_left_to_feedback(model: RobotModel) -> None:
-    approach, _ = approach_from(model, compile_motion("wave", model))
-    assert not approach.p_start.any()
+    p_start, _ = offset_from(model, compile_motion("wave", model))
+    assert not p_start.any()
 
 
 GRAVITY, DT = 9.81, 0.002
