@@ -217,35 +217,20 @@ def _barrier(way: Way) -> Study:
     return Study(way.name, {way.item: rows}, measure, done="done", group="sight", sensors=None)
 
 
-@dataclass(frozen=True, slots=True)
-class Reversals:
-    """Level ground under hard commands."""
-
-    name: str  #: of the scenario
-    item: str  #: what it is, for the report
-    friction: float | None = None  #: in the place of what is drawn; None for that
-    latest: int = 0  #: see ``UnreliablePlant``, as for ``lost``
-    lost: float = 0.0
-
-    @property
-    def study(self) -> Study:
-        """Its rows and its trial."""
-        rows = (("done", "share done", ">= 1"), ("off", "velocity off", "<= 0.25 m/s"))
-        measure = partial(measure_reversals, case=self)
-        return Study(self.name, {self.item: rows}, measure, done="done", group="reversals")
-
-
 def measure_reversals(
-    trial: Trial, found: TrialResult, case: Reversals, first_seed: int = FIRST_SEED
+    trial: Trial,
+    found: TrialResult,
+    friction: float | None = None,
+    latest: int = 0,
+    lost: float = 0.0,
+    first_seed: int = FIRST_SEED,
 ) -> None:
-    """Follow the commands; see the module's docstring."""
+    """Follow the commands; ``friction`` is drawn if it is None, for the rest see the plant."""
     seed = first_seed + trial.seed
     rng, off = np.random.default_rng(seed), []
-    friction, mass = float(rng.uniform(*FRICTION)), float(rng.uniform(*MASS))
-    drawn = {"friction": case.friction or friction, "mass_scale": mass}
-    settings = {**drawn, "sensors": trial.sensors, "seed": seed}
-    plant = UnreliablePlant(settings, latest=case.latest, lost=case.lost)
-    with TrialRobot(plant) as robot:
+    drawn, mass = float(rng.uniform(*FRICTION)), float(rng.uniform(*MASS))
+    world = {"friction": friction or drawn, "mass_scale": mass, "sensors": trial.sensors}
+    with TrialRobot(UnreliablePlant({**world, "seed": seed}, latest=latest, lost=lost)) as robot:
         robot.require(robot.go2.walk())
         for ahead, left, turn in COMMANDS * ROUNDS:
             robot.truth.clear()
@@ -316,13 +301,17 @@ BARRIERS = (
     Way("seen-step-30", "step of 30 cm", _at(Stairs(0.3, count=1, start=2.0))),
 )
 BARRIERS = tuple(replace(way, sees="lidar") for way in BARRIERS)
-CASES = (
-    Reversals("flat", "reversals"),
-    Reversals("flat-late", "the same, 0 to 18 ms late", latest=LATEST),
-    Reversals("flat-lost", "the same, 5 % lost", lost=0.05),
-    Reversals("flat-slippery", "the same, friction 0.3", friction=0.3),
+_ROWS = (("done", "share done", ">= 1"), ("off", "velocity off", "<= 0.25 m/s"))
+REVERSALS = tuple(
+    Study(name, {item: _ROWS}, measure, done="done", group="reversals")
+    for name, item, measure in (
+        ("flat", "reversals", measure_reversals),
+        ("flat-late", "the same, 0 to 18 ms late", partial(measure_reversals, latest=LATEST)),
+        ("flat-lost", "the same, 5 % lost", partial(measure_reversals, lost=0.05)),
+        ("flat-slippery", "the same, friction 0.3", partial(measure_reversals, friction=0.3)),
+    )
 )
-_STUDIES = [*(way.study for way in WAYS), *(case.study for case in CASES)]
+_STUDIES = [*(way.study for way in WAYS), *REVERSALS]
 STUDIES = (*_STUDIES, *(study.sensed(study.group) for study in _STUDIES))
 STUDIES += (*(way.study for way in SEEING), *(_barrier(way) for way in BARRIERS))
 """In the order of the report."""

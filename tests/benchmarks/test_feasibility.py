@@ -9,12 +9,12 @@ import pytest
 from benchmarks import feasibility
 from benchmarks.__main__ import main
 from benchmarks.feasibility import (
+    DYNAMIC,
     EXAM,
     OUTCOMES,
     REFUSED,
     asked_of,
     judged,
-    judged_dynamic,
     study_of,
 )
 from benchmarks.study import IDEAL, IMU, TrialResult
@@ -60,7 +60,7 @@ def test_the_bars_are_those_of_the_test_half_and_no_motion_is_lost(
     said_ok, said = judged(cases, len(cases) + lost)
     assert said_ok is is_ok
     assert f"{lost} without a result" in said
-    assert judged_dynamic(cases, len(cases) + lost)[0] is is_ok_dynamic
+    assert judged(cases, len(cases) + lost, DYNAMIC)[0] is is_ok_dynamic
 
 
 def fake(trial: Trial, found: TrialResult, *_: object, **__: object) -> None:
