@@ -120,7 +120,7 @@ def sweep(
         left = [seed for seed in seeds if seed not in known]
         are_enough = _are_enough(first, seeds, known, is_enough)
         on_progress(Progress(n - len(left), n, 0.0))
-        with closing(runner.run(target.job, [] if are_enough else left)) as ends:
+        with closing(runner.run(target.call, [] if are_enough else left)) as ends:
             for count, ended in enumerate(ends, 1):
                 if ended.failure is None:
                     rows.add(ended.item, ended.value)

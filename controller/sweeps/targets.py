@@ -13,7 +13,7 @@ import platform
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING
@@ -72,30 +72,23 @@ class Target:
     """What its rows depend on besides the project's code."""
 
     @property
-    def job(self) -> Job:
+    def call(self) -> Callable[[int], Row]:
         """What workers call."""
-        return Job(self.function, own_code())
+        return partial(checked_row, self.function, own_code())
 
 
-@dataclass(frozen=True, slots=True)
-class Job:
-    """What a worker calls: the function of a target, after a look whether its code is the same."""
+def checked_row(function: Callable[[int], object], code: tuple[str, str], seed: int) -> Row:
+    """The row of a seed, by a worker of the same code and libraries as its parent.
 
-    function: Callable[[int], object]  #: from a seed to a row
-    code: tuple[str, str]  #: the code and libraries that the rows depend on, as the parent has them
-
-    def __call__(self, seed: int) -> Row:
-        """The row of a seed.
-
-        Raises:
-            SweepError: if this worker has other code than the parent, or it is no row.
-        """
-        if (own := own_code()) != self.code:
-            raise SweepError(
-                f"this worker has other code than the sweep: {' and '.join(own)}, not "
-                f"{' and '.join(self.code)}; install the same version everywhere"
-            )
-        return row_of(self.function(seed))
+    Raises:
+        SweepError: if it has others, or what the function gives is no row.
+    """
+    if (own := own_code()) != code:
+        raise SweepError(
+            f"this worker has other code than the sweep: {' and '.join(own)}, not "
+            f"{' and '.join(code)}; install the same version everywhere"
+        )
+    return row_of(function(seed))
 
 
 @cache

@@ -16,7 +16,7 @@ import pytest
 from controller import sweep
 from controller.sweeps import Progress, read_sweep
 from controller.sweeps.sweep_file import Row
-from controller.sweeps.targets import Job, LoadedFunction
+from controller.sweeps.targets import LoadedFunction, checked_row
 from go2_wbc.errors import CommandError, ConfigError, SweepError
 from tests.controller.sweeps import swept
 from tests.script_server import ROOT, python
@@ -269,4 +269,4 @@ def test_a_file_that_changes_during_the_sweep_is_told(tmp_path: Path) -> None:
 
 def test_a_worker_with_other_code_is_told() -> None:
     with pytest.raises(SweepError, match="this worker has other code than the sweep"):
-        Job(swept.trial, ("another digest", "numpy 1"))(0)
+        checked_row(swept.trial, ("another digest", "numpy 1"), 0)
