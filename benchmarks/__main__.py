@@ -9,7 +9,7 @@ from controller.cli.main import Command, Program, run_program
 COMMANDS: tuple[Command, ...] = (
     Command("behaviour", "benchmarks.behaviour", "what the robot does in MuJoCo, over many seeds"),
     Command("feasibility", "benchmarks.feasibility", "the feasibility check against physics"),
-    Command("bridges", "benchmarks.bridges.command", "ROS 2 and Unitree's protocol, by processes"),
+    Command("bridges", "benchmarks.bridges", "ROS 2 and Unitree's protocol, by processes"),
     Command("qp_infeasibility", "benchmarks.qp_infeasibility", "the QP that contradicts itself"),
     Command("locomotion", "benchmarks.locomotion", "gaits at their speeds"),
     Command("envelopes", "benchmarks.envelopes", "the greatest speed of each gait, and store it"),

@@ -57,8 +57,8 @@ def ros2(
         go2-wbc ros2 --realtime --sensors imu        odometry as a robot has it
         go2-wbc ros2 --realtime --motions plans      also plays plans/greet.plan
     """
+    from controller.bridges.ros2.behaviors import SavedMotions
     from controller.bridges.ros2.server import ServerSettings, serve
-    from controller.bridges.saved_motions import SavedMotions
 
     logging.getLogger("controller").setLevel(logging.INFO)
     saved = SavedMotions(motions)

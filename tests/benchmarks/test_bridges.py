@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.bridges.command import STUDIES
+from benchmarks.bridges import STUDIES
 from benchmarks.study import chosen_studies
 from controller.cli.common import ExitCode
 

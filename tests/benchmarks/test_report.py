@@ -73,7 +73,7 @@ def test_the_table_fits_80_columns_with_numbers_apart_and_names_the_fallen_seed(
 @pytest.mark.parametrize(
     "name",
     [
-        *("balance", "behaviour", "bridges.command", "combined", "dance", "faults", "locomotion"),
+        *("balance", "behaviour", "bridges", "combined", "dance", "faults", "locomotion"),
         *("adversary", "qp_infeasibility", "sequences"),
     ],
 )

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import final
 
-from controller.bridges.saved_motions import SavedMotions
 from controller.go2_controller import GO2Controller
 from controller.jobs import Job, JobServer, Reply
 from controller.modes import Aborted, Measurements, Mode, Outcome
@@ -13,6 +15,46 @@ from go2_wbc.motion_plan import MotionPlan, Posture
 from motions import Playable, find_motion
 from motions.authoring import parse_values
 from motions.saved.files import is_saved
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class SavedMotions:
+    """Saved motions of one folder: files of numbers, never code.
+
+    Clients ask for them by file name; no other file of the machine can be named.
+    """
+
+    folder: Path | None = None  #: that they lie in, not below it; None for none
+
+    def __post_init__(self) -> None:
+        """Raise CommandError for what is no folder."""
+        if self.folder is not None and not self.folder.is_dir():
+            raise CommandError(f"{self.folder} is no folder")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the files that are there now; links to other folders are not among them."""
+        if self.folder is None:
+            return ()
+        home = self.folder.resolve()
+        found = (file for file in home.iterdir() if is_saved(file.name) and file.is_file())
+        return tuple(sorted(file.name for file in found if file.resolve().parent == home))
+
+    def file(self, name: str) -> Path:
+        """The file of this name, which ``GO2Controller.prepare`` takes.
+
+        Raises:
+            CommandError: for an unknown name; lists the valid ones.
+        """
+        if self.folder is None:
+            raise CommandError(
+                "no folder of saved motions was named at the start: --motions FOLDER"
+            )
+        if name not in (names := self.names):
+            raise CommandError(unknown_name("saved motion", f"{name:.80}", names))
+        return self.folder / name
+
 
 NONE_SAVED = SavedMotions()  #: Only motions of the library
 STOP, DAMP = "stop", "damp"

@@ -33,11 +33,17 @@ from controller import arguments
 from controller.bridges import ros2
 from controller.bridges.ros2 import MOTION_ACTION
 from controller.bridges.ros2 import imports as ros
-from controller.bridges.ros2.behaviors import COMMANDS, NONE_SAVED, Jobs, motion_job, order
+from controller.bridges.ros2.behaviors import (
+    COMMANDS,
+    NONE_SAVED,
+    Jobs,
+    SavedMotions,
+    motion_job,
+    order,
+)
 from controller.bridges.ros2.namespace_lock import GraphWatch, lock_namespace
 from controller.bridges.ros2.states import StatePublisher
 from controller.bridges.ros2.velocity import VelocityInput
-from controller.bridges.saved_motions import SavedMotions
 from controller.go2_controller import GO2Controller
 from controller.jobs import JobServer, Reply
 from controller.modes import Outcome

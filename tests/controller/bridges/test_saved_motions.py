@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from controller.bridges.ros2.behaviors import motion_job
-from controller.bridges.saved_motions import SavedMotions
+from controller.bridges.ros2.behaviors import SavedMotions, motion_job
 from controller.bridges.unitree import drive
 from controller.go2_controller import GO2Controller
 from controller.jobs import JobServer

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from controller.bridges.saved_motions import SavedMotions
+from controller.bridges.ros2.behaviors import SavedMotions
 from controller.bridges.unitree import drive, plant
 from controller.cli import bridges
 from controller.cli.main import main
