@@ -15,6 +15,14 @@ computed for the robot as it will be then (Smith, Closer control of loops with d
 the model of the QP for the plant). On the flat a trot on a friction of 0.3 or less fell within a
 second with 10 ms, as one on 0.6 did with 20. Commands that act at once leave the state as it is,
 bit by bit.
+
+A foot that lands early or late is not predicted. The motors know their joints at once; beside its
+torques a late command therefore carries a servo about the angles and speeds that are predicted for
+the middle of the period in which it acts (as Kim et al., Highly dynamic quadruped locomotion via
+whole-body impulse control and model predictive control, 2019), which adds nothing as long as all
+goes as predicted:
+
+    tau + kp (q + v dt / 2 - q_measured) + kd (v + a dt / 2 - v_measured)
 """
 
 from __future__ import annotations
@@ -27,8 +35,8 @@ from jaxtyping import Float
 
 from go2_wbc.algebra.linear import rotation_of
 from go2_wbc.compilation import Foreign, kernel
-from go2_wbc.records import Record
-from go2_wbc.robot.state import RobotState
+from go2_wbc.records import Array18, Record
+from go2_wbc.robot.state import JointCommand, RobotState, Snapshot
 from go2_wbc.robot.state_filter import turn
 
 LAGS = 11  #: Control periods by which a command may be late, none included: up to 20 ms at 500 Hz
@@ -41,6 +49,11 @@ READ = 1.0  #: Lag that is none of the commands: by so much readings may be old
 WORST_FIT = 0.5
 """Share of that change up to which a lag may be off: motors that do not obey tell of none."""
 LEAST_CHANGE = 1e-3  #: Mean square [N^2 m^2] of that change below which it says nothing
+
+KP, KD = 20.0, 1.0
+"""Gains [N m/rad, N m s/rad] of the servo of late commands. Up to 18 ms late, 1 m/s over blocks of
+12 cm, stairs, waves and ramps, 38 of 40 arrived, 23 with none, 31 with kd alone; twice the damping
+or the stiffness, or half of either, was no better on harder ones (17 of 30; 12 to 16; none: 8)."""
 
 
 class Lag(Record):
@@ -141,6 +154,14 @@ class Latency:
     def note(self, tau: Float[np.ndarray, "12"], qdd: Float[np.ndarray, "18"]) -> None:
         """The torques [N m] that have just been asked for, and what they are to make."""
         note_command(self._lag, tau, qdd)
+
+    def held(self, command: JointCommand, qdd: Array18, ahead: Snapshot) -> JointCommand:
+        """A noted command, if late with the servo about what it is to make of ``ahead``."""
+        if not READ < self._lag.ticks < self._lag.known:  # else nothing was predicted
+            return command
+        half, v = 0.5 * self._period, ahead.v[6:]
+        servo = JointCommand.servo(ahead.q[7:] + half * v, v + half * qdd[6:], KP, KD)
+        return replace(servo, tau=command.tau)
 
     def forget(self) -> None:
         """Something else has been asked for, of which nothing is foretold."""

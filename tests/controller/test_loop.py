@@ -85,13 +85,16 @@ def test_a_simulated_robot_is_taken_where_it_will_be_and_one_that_may_be_real_wh
 ) -> None:
     monkeypatch.setattr(StillPlant, "is_hardware", is_hardware)
     loop: ControlLoop = request.getfixturevalue("loop")
+    plant: StillPlant = request.getfixturevalue("plant")
     loop.engage(Balance(loop.model))
     run(loop, 3)
     assert loop.snapshot.state is loop.state
+    assert not plant.commands[-1].kp.any()
     loop.latency._lag.ticks = 2.0
     run(loop, 1)
     assert (loop.snapshot.state is loop.state) is is_hardware
     assert loop.snapshot.state.time == loop.state.time
+    assert is_hardware or plant.commands[-1].kp.all()
 
 
 @pytest.mark.parametrize("broken", [range(5, 6), range(5, 9)])

@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from go2_wbc.robot.latency import LAGS, Latency
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.latency import KD, KP, LAGS, READ, Latency
+from go2_wbc.robot.state import JointCommand, RobotState
 from tests import engine_helpers as helpers
 
 MODEL = helpers.symmetric_model()
@@ -103,3 +103,24 @@ def test_the_state_is_carried_on_as_the_accelerations_say(late: int) -> None:
     assert np.abs(moved).max() < 2e-4  # of 20 mm and 0.1 rad
     assert isinstance(found, RobotState)
     assert found.time == state.time
+
+
+@pytest.mark.parametrize("late", [0, 1, 2, LAGS - 1])
+def test_joints_of_late_commands_are_held_about_what_is_predicted(late: int) -> None:
+    rng = np.random.default_rng(late)
+    latency, state = Latency(PERIOD), helpers.random_state(rng)
+    followed(latency, jagged(rng, 500), late)
+    ahead, qdd = MODEL.snapshot(state), 20.0 * rng.normal(size=18)
+    command = JointCommand.torque(rng.normal(size=12))
+    held = latency.held(command, qdd, ahead)
+    if late <= READ:  # by that much readings may be old
+        assert held is command
+        return
+    v = state.v[6:] + 0.5 * PERIOD * qdd[6:]
+    q = state.q[7:] + 0.5 * PERIOD * state.v[6:]
+    np.testing.assert_allclose(held.asked(q, v), command.tau, atol=1e-12)
+    np.testing.assert_allclose(held.asked(q + 0.01, v) - command.tau, -0.01 * KP)
+    np.testing.assert_allclose(held.asked(q, v + 0.1) - command.tau, -0.1 * KD)
+    latency.forget()  # of a state that was not carried on nothing is predicted
+    latency.note(command.tau, qdd)
+    assert latency.held(command, qdd, ahead) is command
