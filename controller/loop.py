@@ -237,7 +237,7 @@ class ControlLoop:
         if not (isinstance(target, Reference) and self.plant.motors_obey):
             return
         if hold_feet(Target.of(target.row), self.snapshot, self.state.tau, self._held) > PULLED:
-            self._feet.update(self._held, self.state, self.plant.control_period)
+            self._feet.update(self._held, self.state, self._sag, self.plant.control_period)
 
     def _payload_of(self, behaviour: Behaviour) -> Payload:
         return self.telemetry.payload if behaviour.knows_payload else NO_PAYLOAD

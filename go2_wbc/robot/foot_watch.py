@@ -23,6 +23,10 @@ its joints, was dragged towards its place by 13 N while the ground still pressed
 UPRIGHT, CARRIED = 0.3, 0.5
 """Tilt [rad] from which on, and share of its weight on its feet below which, a robot tumbles: its
 legs strike each other. With a foot held, the others bear 0.65 at least."""
+SUNK = 0.05
+"""Depth [m] of the trunk below where it shall be from which on the feet stay behind with it: one
+that was on a knee lay 0.12 too low, and its raised foot hung below its place, held by nothing. With
+a foot held the trunk is 0.01 too low at most."""
 
 
 class FootWatch:
@@ -38,13 +42,14 @@ class FootWatch:
         self.faults: tuple[PartFault, ...] = ()
         self._time, self._impulse, self._last = np.zeros(4), np.zeros(4), -np.inf
 
-    def update(self, held: Array4, state: RobotState, dt: float) -> None:
+    def update(self, held: Array4, state: RobotState, sag: float, dt: float) -> None:
         """Take in the force [N] that holds each foot: see ``reference.hold_feet``.
 
-        Ticks in which none is held may be left out.
+        ``sag`` [m]: of the trunk below where it shall be. Ticks in which none is held may be left
+        out.
         """
         forces = state.foot_forces
-        stands = state.tilt < UPRIGHT and forces.sum() > self._carried
+        stands = state.tilt < UPRIGHT and sag < SUNK and forces.sum() > self._carried
         is_held = (held > PULLED + GRIP * forces) & (forces < UNFELT) & stands
         goes_on = is_held & (state.time - self._last < 1.5 * dt)
         self._last = state.time

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from go2_wbc.robot.foot_watch import IMPULSE, LASTS, PULLED, UNFELT, FootWatch
+from go2_wbc.robot.foot_watch import IMPULSE, LASTS, PULLED, SUNK, UNFELT, FootWatch
 from go2_wbc.robot.state import RobotState
 
 DT = 0.002
@@ -18,6 +18,7 @@ def watched(
     time: float = 0.1,
     gap: float = np.inf,
     others: float = 50.0,
+    sag: float = 0.0,
 ) -> FootWatch:
     """After its second foot has been held with a force [N] for a time, but for some ticks."""
     watch, q = FootWatch(150.0), np.zeros(19)
@@ -25,12 +26,12 @@ def watched(
     for k in (k for k in range(round(time / DT)) if k % gap != gap - 1):
         forces = np.array([others, force, others, others])
         state = RobotState(DT * k, q, np.zeros(18), np.full(12, 5.0), forces, forces > UNFELT)
-        watch.update(np.array([0.0, held, 0.0, 0.0]), state, DT)
+        watch.update(np.array([0.0, held, 0.0, 0.0]), state, sag, DT)
     return watch
 
 
 def test_a_held_foot_is_named_once() -> None:
-    (fault,) = watched(3.0 * PULLED).faults
+    (fault,) = watched(3.0 * PULLED, sag=0.9 * SUNK).faults
     assert str(fault).startswith("FR_foot was held")
     assert fault.is_survived
 
@@ -45,6 +46,7 @@ def test_a_held_foot_is_named_once() -> None:
         {"time": 0.9 * LASTS},
         {"gap": 8},
         {"others": 15.0},
+        {"sag": 1.1 * SUNK},
         {"held": 2.5 * PULLED, "force": 0.8 * UNFELT},
     ],
 )
