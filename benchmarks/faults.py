@@ -8,7 +8,7 @@ none stands on three with a dead motor in another, and a held foot that stands i
 - falls: the trunk touches the ground, or tilts by 60 deg, before the robot has gone limp; or it
   tilts so far afterwards;
 - goes on: it has not gone limp, and ``stand()`` is true at the end;
-- others: parts that are named though they are sound.
+- others: parts that are named, be it for a moment, though they are sound.
 
 ``walks``: what everything must go on with, in twenty seconds of trot and other calls. ``alarms``:
 two minutes of random calls of a sound robot in a world of other tables, every other one under
@@ -34,6 +34,7 @@ from go2_wbc.plant.faults import AXES
 from go2_wbc.plant.mujoco.ground_truth import FALLEN_TILT, TOUCH
 from go2_wbc.recording import true_runs
 from go2_wbc.robot.description import GO2
+from go2_wbc.robot.state import Health, PartFault
 from motions import load_motion
 
 FIRST_SEED = 10100
@@ -113,25 +114,34 @@ def measure_break(trial: Trial, found: TrialResult, what: Break) -> None:
             parts = what.broken(trial.seed, state)
             for part in parts:
                 robot.plant.fault(what.kind, part=part, at=at, value=what.value)
-            values = _lived_through(robot, state, at)
+            told = set[PartFault]()
+            values = _lived_through(robot, state, at, told)
             health, reason = robot.go2.health, robot.go2.last_outcome.reason
         broken = {what.named.format(part) for part in parts}
-        told = reversed(health.faults)  # of a part that is named twice, when it first was
-        times = {fault.part: fault.since - at for fault in told if fault.part in broken}
+        times = dict[str, float]()  # of a part that is named twice, when it first was
+        for fault in sorted(told, key=lambda fault: -fault.since):
+            if fault.part in broken:
+                times[fault.part] = fault.since - at
         if what.at_once and state == "three-legs":  # a dead sensor is right of a paw in the air
             broken.discard(what.named.format(PAW))
         values["named"] = max(times.get(part, math.inf) for part in broken) <= NAMED_WITHIN
-        values["others"] = len(health.faults) - len(times)
+        values["others"] = len(told) - len(times)
         found.notes[state] = f"{', '.join(parts)} at {at:.2f} s: {health}; {reason}"
         found.values |= {f"{state}-{name}": float(value) for name, value in values.items()}
 
 
-def _lived_through(robot: TrialRobot, state: str, at: float) -> dict[str, float]:
-    """Whether a robot of which something breaks at that time [s] falls, and goes on."""
+def _lived_through(
+    robot: TrialRobot, state: str, at: float, told: set[PartFault]
+) -> dict[str, float]:
+    """Whether a robot of which something breaks at that time [s] falls, and goes on.
+
+    What it names goes into ``told``.
+    """
     go2, limp = robot.go2, math.inf
 
     def look() -> None:
         nonlocal limp
+        told.update(go2.health.faults)
         if go2.mode in DOWN:
             limp = min(limp, robot.plant.time)
 
@@ -182,18 +192,22 @@ def measure_alarms(trial: Trial, found: TrialResult, world: Unknown | Robot) -> 
     rng = np.random.default_rng((FIRST_SEED + trial.seed, *world.name.encode()))
     plant = world.plant(FIRST_SEED + trial.seed, trial.sensors)
     with TrialRobot(plant, world.config if isinstance(world, Robot) else None) as robot:
-        life = Watch(robot, rng)
-        if trial.seed % 2:
-            robot.truth.on_tick = life.look
+        life, told = Watch(robot, rng), set[PartFault]()
+
+        def look() -> None:
+            told.update(robot.go2.health.faults)
+            if trial.seed % 2:
+                life.look()
+
+        robot.truth.on_tick = look
         while plant.time < LIFE:
             make(robot, life, str(rng.choice(CALLED)), rng)
             for _ in range(RECOVERIES):
                 if robot.go2.mode in DOWN:
                     make(robot, life, "recover", rng)
             robot.truth.clear()
-        health = robot.go2.health
-    found.values = {"alarms": float(len(health.faults)), "time": plant.time / 60.0}
-    found.notes["health"] = str(health)
+    found.values = {"alarms": float(len(told)), "time": plant.time / 60.0}
+    found.notes["health"] = str(Health(tuple(told)))
 
 
 _motor = partial(Break, kind="motor", named="motor of {}", is_of_paw=True)

@@ -223,8 +223,10 @@ class ControlLoop:
 
     def _look_after_parts(self) -> None:
         """Say what has broken; a robot that cannot stand without it goes limp before it falls."""
-        faults = (*self.plant.sensor_faults, *self._motors.faults, *self._feet.faults)
-        if len(faults) != len(self.health.faults):
+        feet, now = self._feet, self.state.time
+        sensed = (fault for fault in self.plant.sensor_faults if not feet.excuses(fault, now))
+        faults = (*sensed, *self._motors.faults, *feet.faults)
+        if faults != self.health.faults:
             for fault in (fault for fault in faults if fault not in self.health.faults):
                 self.warn(REASON, fault)
             self.health = Health(faults)

@@ -2,7 +2,8 @@
 
 It feels no ground meanwhile: what stumbles, on boxes or at the face of a step, is not held.
 
-What holds it takes the leg's load later on: its sensor may then be taken for dead, too.
+What holds it takes the leg's load later on: its sensor, taken for dead then, has a second to show
+that it lives.
 """
 
 from __future__ import annotations
@@ -28,6 +29,10 @@ SUNK = 0.05
 that was on a knee lay 0.12 too low, and its raised foot hung below its place, held by nothing. With
 a foot held the trunk is 0.01 too low at most."""
 
+EXCUSED = 1.0
+"""Time [s] after it was held in which a foot's sensor may contradict the leg: it is held for 0.3 s,
+and its sensor is found sound 0.1 s into the stance after that."""
+
 
 class FootWatch:
     """Judges the feet of one robot.
@@ -41,6 +46,7 @@ class FootWatch:
         self._carried = CARRIED * weight
         self.faults: tuple[PartFault, ...] = ()
         self._time, self._impulse, self._last = np.zeros(4), np.zeros(4), -np.inf
+        self._held_at = np.full(4, -np.inf)
 
     def update(self, held: Array4, state: RobotState, sag: float, dt: float) -> None:
         """Take in the force [N] that holds each foot: see ``reference.hold_feet``.
@@ -56,5 +62,13 @@ class FootWatch:
         self._time = np.where(is_held, self._time * goes_on + dt, 0.0)
         self._impulse = np.where(is_held, self._impulse * goes_on + held * dt, 0.0)
         for leg in np.flatnonzero((self._time > LASTS) & (self._impulse > IMPULSE)):
+            self._held_at[leg] = state.time
             if all(fault.part != FOOT_NAMES[leg] for fault in self.faults):
                 self.faults += (PartFault(FOOT_NAMES[leg], "was held", True, state.time),)
+
+    def excuses(self, fault: PartFault, time: float) -> bool:
+        """Whether a sensor's fault may be, at this time [s], that its foot has just been held."""
+        if fault.part not in FOOT_NAMES:
+            return False
+        held_at = self._held_at[FOOT_NAMES.index(fault.part)]
+        return bool(held_at < fault.since and time < held_at + EXCUSED)

@@ -72,6 +72,9 @@ NOISY, MOST_NOISE, NOISE_TIME = 1.5, 4.0, 0.2
 its own is 2.6. While such a one changes it lives, whatever its leg bears: a calf may lie on a box.
 Others say the same while the load stays: they are judged once that changes."""
 CHANGED = 15.0  #: By so much [N]
+SOUND_TIME = 0.1
+"""A sensor that was named is sound after all if it has changed with the load, within ``CHANGED``,
+for so long [s]: its foot was held in the air, say, and its leg pressed on what held it."""
 RUBBING = 2.0
 """N m s/rad; joints damped so, as in MuJoCo Menagerie's Go2, may not be taken for loads."""
 CARRIED, UPRIGHT = 0.7, 0.9
@@ -99,6 +102,7 @@ class WatchedSensors(Record):
     load: Array4  #: of the leg, when that began [N]
     stood: Array4  #: for how long a foot has borne its leg's load [s]
     against: Array4  #: for how long a foot's force has contradicted the leg's torques [s]
+    agreed: Array4  #: for how long it has changed with them since it was named [s]
     gyro: Array3  #: the last, as it was read
     accelerometer: Array3  #: the last, as it was read
     speed_noise: SpeedNoise  #: of the joints' speeds and the gyro
@@ -272,6 +276,11 @@ def watch_force(
     is_same = s.force_same[leg] > SAME_TIME and (has_changed or s.noise[felt, leg] > NOISY)
     if carries and (is_same or s.against[leg] > FORCE_TIME):
         s.force_is_wrong[leg] = 1.0
+    agrees = carries and force > SENSED and abs(force - borne) < CHANGED
+    agrees = agrees and s.force_is_wrong[leg] > 0.0 and s.force_same[leg] < DOUBT
+    s.agreed[leg] = s.agreed[leg] + dt if agrees else 0.0
+    if s.agreed[leg] > SOUND_TIME:
+        s.force_is_wrong[leg] = 0.0
     if s.force_is_wrong[leg] > 0.0:
         r.foot_forces[leg] = borne if borne > LOADED else 0.0
 
@@ -433,18 +442,21 @@ class SensorWatch:
         self._time = reading.time
         imu, joints = (reading.gyro, reading.accelerometer), (reading.q_joints, reading.v_joints)
         told = (*imu, *joints, reading.tau, reading.foot_forces, quaternion)
-        if watch_sensors(self._state, *told, self._numbers, dt, self._reading):
+        if watch_sensors(self._state, *told, self._numbers, dt, self._reading) or self.faults:
             self._name(reading.time)
         row = numbers_of(self._reading).copy()
         return SensorReading(reading.time, *(row[part] for part in _OF_READING))
 
     def _name(self, time: float) -> None:
-        """Note what is newly broken."""
+        """Note what is newly broken, and which foot's sensor is sound after all."""
         flags = self._state.row[_FLAGS]
-        new = np.flatnonzero(flags > self._flags)
-        if len(new):
-            self._flags = np.maximum(flags, self._flags)
-            self.faults += tuple(PartFault(*_PARTS[k], since=time) for k in new)
+        known = np.where(_IS_FOOT, flags, np.maximum(flags, self._flags))
+        if np.array_equal(known, self._flags):
+            return
+        sound = {_PARTS[k][0] for k in np.flatnonzero(known < self._flags)}
+        new = tuple(PartFault(*_PARTS[k], since=time) for k in np.flatnonzero(known > self._flags))
+        self.faults = (*(fault for fault in self.faults if fault.part not in sound), *new)
+        self._flags = known
 
     def save(self) -> Mapping[str, Any]:
         """All that the next readings are judged by."""
@@ -467,4 +479,5 @@ _PARTS = (
     ("accelerometer", "feels otherwise than the feet that stand move", True),
 )
 """What each flag of ``WatchedSensors`` says, in their order."""
+_IS_FOOT = np.array([part in FOOT_NAMES for part, *_ in _PARTS])
 _FLAGS = slice(-len(_PARTS), None)

@@ -1,12 +1,13 @@
 """A foot that is held in the air is named, unless it touches something or all is upset."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from go2_wbc.robot.foot_watch import IMPULSE, LASTS, PULLED, SUNK, UNFELT, FootWatch
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.foot_watch import EXCUSED, IMPULSE, LASTS, PULLED, SUNK, UNFELT, FootWatch
+from go2_wbc.robot.state import PartFault, RobotState
 
 DT = 0.002
 
@@ -54,3 +55,13 @@ def test_a_foot_that_follows_stumbles_is_struck_or_tumbles_is_not_held(
     changes: dict[str, Any],
 ) -> None:
     assert watched(**{"held": 3.0 * PULLED, **changes}).faults == ()
+
+
+def test_the_sensor_of_a_foot_that_was_held_has_time_to_show_that_it_lives() -> None:
+    watch = watched(3.0 * PULLED, time=0.1)
+    fault = PartFault("FR_foot", "feels nothing", True, 0.3)
+    assert watch.excuses(fault, 0.1 + 0.9 * EXCUSED)
+    assert not watch.excuses(fault, 0.1 + 1.1 * EXCUSED)
+    for other in ({"part": "FL_foot"}, {"part": "FR_calf_joint"}, {"since": 0.05}):
+        assert not watch.excuses(replace(fault, **other), 0.3)
+    assert not watched(0.9 * PULLED).excuses(fault, 0.3)

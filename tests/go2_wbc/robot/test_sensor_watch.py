@@ -26,12 +26,14 @@ from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.sensor_watch import (
     CHANGED,
+    DOUBT,
     FREE,
     LOADED,
     NOISY,
     RUBBING,
     SAME_TIME,
     SENSED,
+    SOUND_TIME,
     UNFELT,
     SensorWatch,
     WatchedSensors,
@@ -180,6 +182,43 @@ def test_a_foots_dead_or_stuck_sensor_gives_way_to_the_legs_torques(value: float
     last, faults = watched(*(reading(k, foot_forces=forces(k)) for k in range(700)))
     assert [fault.part for fault in faults] == ["RR_foot"]
     assert last.foot_forces[3] == pytest.approx(0.25 * MODEL.mass * MODEL.gravity, abs=0.1)
+
+
+def test_a_foots_sensor_that_feels_what_its_leg_bears_is_sound_after_all() -> None:
+    watch, named, loads = SensorWatch(MODEL), [], np.array([1.0, 1.0, 1.0, 0.0])
+    for k in range(700):
+        forces = reading(k).foot_forces
+        heard = forces * loads if 200 < k <= 400 else forces
+        watch.checked(reading(k, foot_forces=heard), LEVEL)
+        named.append([fault.part for fault in watch.faults])
+    assert named[400] == ["RR_foot"]
+    assert named[400 + round(0.8 * SOUND_TIME / DT)] == ["RR_foot"]
+    assert named[400 + round(1.2 * SOUND_TIME / DT)] == []
+    last = reading(700)
+    np.testing.assert_array_equal(watch.checked(last, LEVEL).foot_forces, last.foot_forces)
+
+
+@pytest.mark.parametrize(
+    ("force", "borne", "carries", "same", "agrees"),
+    [
+        (40.0, 40.0 + 0.9 * CHANGED, True, 0.0, True),
+        (40.0, 40.0 - 0.9 * CHANGED, True, 0.0, True),
+        (40.0, 40.0 + 1.1 * CHANGED, True, 0.0, False),
+        (40.0, 40.0 - 1.1 * CHANGED, True, 0.0, False),
+        (40.0, 40.0, False, 0.0, False),
+        (40.0, 40.0, True, DOUBT, False),
+        (0.9 * SENSED, SENSED, True, 0.0, False),
+    ],
+)
+def test_a_sensor_agrees_with_its_leg_while_it_changes_with_its_load(
+    force: float, borne: float, carries: bool, same: float, agrees: bool
+) -> None:
+    for leg in range(4):
+        s, r = WatchedSensors(), reading(1, foot_forces=np.full(4, force))
+        s.force_is_wrong[leg], s.agreed[leg], s.force_same[leg] = 1.0, DT, same
+        s.force[leg] = s.load[leg] = force if same else force - 1.0
+        watch_force(s, r, leg, borne, 0.0, carries, DT)
+        assert s.agreed[leg] == (2.0 * DT if agrees else 0.0)
 
 
 def test_a_sensor_without_noise_may_say_the_same() -> None:
