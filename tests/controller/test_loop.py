@@ -15,9 +15,10 @@ from go2_wbc.planning.command import ZERO_COMMAND
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.reference import JointReference, Reference
 from go2_wbc.robot.description import find_profile
+from go2_wbc.robot.foot_watch import PULLED, SUNK
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.safety import SafetyConfig
-from go2_wbc.robot.state import Snapshot
+from go2_wbc.robot.state import PartFault, Snapshot
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WbcSolution, WholeBodyController
 from go2_wbc.wbc.solvers import LIMITS
@@ -269,6 +270,35 @@ def test_engaging_a_behaviour_clears_the_fault(loop: ControlLoop) -> None:
     loop.abandon(Fault("a test"))
     loop.engage(Damped())
     assert loop.fault is None
+
+
+def test_a_part_that_is_found_sound_after_all_is_no_longer_told(
+    loop: ControlLoop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dead = PartFault("RR_foot", "feels nothing", True, 0.0)
+    for faults in ((dead,), (replace(dead, part="FL_foot"),), ()):
+        monkeypatch.setattr(StillPlant, "sensor_faults", faults)
+        run(loop, 1)
+        assert loop.health.faults == faults
+
+
+def test_a_raised_foot_of_a_robot_that_has_sunk_is_not_held(
+    plant: StillPlant, loop: ControlLoop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held = np.array([3.0 * PULLED, 0.0, 0.0, 0.0])
+    monkeypatch.setattr(StillPlant, "motors_obey", True)
+    monkeypatch.setattr("controller.loop.hold_feet", lambda *asked: np.copyto(asked[3], held) or 99)
+    forces = np.array([0.0, 50.0, 50.0, 50.0])
+    plant.state = replace(plant.state, foot_forces=forces)
+    loop.engage(Balance(loop.model))
+    q = plant.state.q.copy()
+    q[2] -= 1.2 * SUNK
+    sound, plant.state = plant.state, replace(plant.state, q=q)
+    run(loop, 20)
+    assert loop.health.is_sound
+    plant.state = replace(sound, time=plant.state.time)
+    run(loop, 20)
+    assert [fault.part for fault in loop.health.faults] == ["FL_foot"]
 
 
 class Broken(WholeBodyController):
