@@ -86,8 +86,8 @@ LEFT_BEHIND, SLACK = 0.3, 0.15
 it is less, give or take: 0.4 in a trot, 0.1 where a paw comes to rest. One that came late against
 its joints' friction, and one whose knee lay on a slope, were left by less but for 16 ms."""
 PROPPED, BRISK = 30.0, 1.0
-"""Force [N] below which a foot in swing that shall go down is not held, if it is led by less than
-that speed [m/s]: its calf lies on something. Noses of steps took 15 to 22 of feet of plans, led at
+"""Force [N] below which a foot in swing is not held, if it is led by less than that speed [m/s]:
+its calf lies on something, or is against it. Noses of steps took 12 to 22 of feet of plans, led at
 .85 at most; feet held in a trot may take no more, but are led faster."""
 
 
@@ -96,8 +96,8 @@ def hold_feet(target: Target, now: Snapshot, tau: Foreign[Array12], held: Array4
     """Fill with what force [N] each foot is held that stays where it shall not, in the air.
 
     With e the way to where it shall be, and the torques ``tau`` that the motors give,
-    e . J^-T (tau - h) / |e|; 0 for the others, and below ``PROPPED`` for feet in slow swing that
-    shall go down. Returns the greatest.
+    e . J^-T (tau - h) / |e|; 0 for the others, and below ``PROPPED`` for feet in slow swing.
+    Returns the greatest.
     """
     way, axes = np.empty(3), np.empty((3, 3))
     for leg in range(4):
@@ -125,8 +125,8 @@ def hold_feet(target: Target, now: Snapshot, tau: Foreign[Array12], held: Array4
             load = triple(tau[j : j + 3] - now.bias[6 + j : 9 + j])
             work = load[0] * dot(e, cross(b, c)) + load[1] * dot(e, cross(c, a))
             held[leg] = (work + load[2] * dot(e, cross(a, b))) / (det * np.sqrt(square))
-            goes_down = target.legs[leg] == SWING and way[2] < 0.0 and led < BRISK**2
-            if goes_down and held[leg] < PROPPED:
+            is_slow = target.legs[leg] == SWING and led < BRISK**2
+            if is_slow and held[leg] < PROPPED:
                 held[leg] = 0.0
     return float(np.max(held))
 
