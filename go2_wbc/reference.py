@@ -85,9 +85,9 @@ LEFT_BEHIND, SLACK = 0.3, 0.15
 """Speed [m/s] at which a held foot is left behind by where it shall be, or all of that's speed if
 it is less, give or take: 0.4 in a trot, 0.1 where a paw comes to rest. One that came late against
 its joints' friction, and one whose knee lay on a slope, were left by less but for 16 ms."""
-PROPPED, BRISK = 30.0, 1.0
+PROPPED, BRISK = 40.0, 1.0
 """Force [N] below which a foot in swing is not held, if it is led by less than that speed [m/s]:
-its calf lies on something, or is against it. Noses of steps took 12 to 22 of feet of plans, led at
+its calf lies on something, or is against it. Noses of steps took 12 to 32 of feet of plans, led at
 .85 at most; feet held in a trot may take no more, but are led faster."""
 
 

@@ -30,8 +30,9 @@ that was on a knee lay 0.12 too low, and its raised foot hung below its place, h
 a foot held the trunk is 0.01 too low at most."""
 
 EXCUSED = 1.0
-"""Time [s] after it was held in which a foot's sensor may contradict the leg: it is held for 0.3 s,
-and its sensor is found sound 0.1 s into the stance after that."""
+"""Time [s] after it was held, be it for half as long as is named, in which a foot's sensor may
+contradict the leg: it is held for 0.3 s, and its sensor is found sound 0.1 s into the stance after
+that."""
 
 
 class FootWatch:
@@ -61,8 +62,8 @@ class FootWatch:
         self._last = state.time
         self._time = np.where(is_held, self._time * goes_on + dt, 0.0)
         self._impulse = np.where(is_held, self._impulse * goes_on + held * dt, 0.0)
+        self._held_at[self._time > 0.5 * LASTS] = state.time
         for leg in np.flatnonzero((self._time > LASTS) & (self._impulse > IMPULSE)):
-            self._held_at[leg] = state.time
             if all(fault.part != FOOT_NAMES[leg] for fault in self.faults):
                 self.faults += (PartFault(FOOT_NAMES[leg], "was held", True, state.time),)
 

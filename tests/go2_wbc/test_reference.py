@@ -173,15 +173,15 @@ def test_a_foot_is_held_by_what_its_motors_push_it_with_towards_its_place() -> N
 @pytest.mark.parametrize(
     ("led", "moves", "force", "is_held"),
     [
-        (0.6, 0.1, 40.0, True),
-        (0.0, 0.0, 40.0, True),
-        (0.4, 0.28, 40.0, False),
-        (0.0, 0.2, 40.0, False),
-        (-0.6, 0.0, 40.0, False),
-        (0.6, 0.1, 20.0, False),
-        (1.4, 0.1, 20.0, True),
-        (-0.6, -0.1, -20.0, False),
-        (-0.6, -0.1, -40.0, True),
+        (0.6, 0.1, 50.0, True),
+        (0.0, 0.0, 50.0, True),
+        (0.4, 0.28, 50.0, False),
+        (0.0, 0.2, 50.0, False),
+        (-0.6, 0.0, 50.0, False),
+        (0.6, 0.1, 30.0, False),
+        (1.4, 0.1, 30.0, True),
+        (-0.6, -0.1, -30.0, False),
+        (-0.6, -0.1, -50.0, True),
     ],
 )
 def test_a_foot_is_held_if_its_place_leaves_it_not_if_it_comes_late_or_is_let_down(

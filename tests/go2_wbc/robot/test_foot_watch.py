@@ -65,3 +65,5 @@ def test_the_sensor_of_a_foot_that_was_held_has_time_to_show_that_it_lives() -> 
     for other in ({"part": "FL_foot"}, {"part": "FR_calf_joint"}, {"since": 0.05}):
         assert not watch.excuses(replace(fault, **other), 0.3)
     assert not watched(0.9 * PULLED).excuses(fault, 0.3)
+    assert watched(3.0 * PULLED, time=0.7 * LASTS).excuses(fault, 0.3)
+    assert not watched(3.0 * PULLED, time=0.3 * LASTS).excuses(fault, 0.3)
