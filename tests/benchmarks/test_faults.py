@@ -5,10 +5,20 @@ from dataclasses import replace
 import pytest
 
 from benchmarks import faults
-from benchmarks.faults import FEET, MOTORS, STUDIES, UNFELT, measure_alarms, measure_walk
+from benchmarks.faults import (
+    FEET,
+    MOTORS,
+    STUDIES,
+    UNFELT,
+    measure_alarms,
+    measure_break,
+    measure_walk,
+)
 from benchmarks.study import TrialResult
 from benchmarks.unknown_world import WORLDS
 from controller.sweeps.trials import Trial
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.robot.state import PartFault
 
 
 @pytest.fixture
@@ -50,6 +60,18 @@ def test_a_sound_life_is_counted_and_a_broken_part_in_it(monkeypatch: pytest.Mon
     monkeypatch.setattr(faults, "make", breaks)
     measure_alarms(Trial(0, sensors="imu"), broken, world)
     assert broken.values["alarms"] == 1.0
+
+
+@pytest.mark.usefixtures("short")
+def test_what_was_named_for_a_moment_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    gyro, sound, broken = PartFault("gyro", "turns", True, 1.0), TrialResult(), TrialResult()
+    told = property(lambda plant: (gyro,) if 0.5 < plant.time % 1.0 < 0.6 else ())
+    monkeypatch.setattr(MujocoPlant, "sensor_faults", told)
+    measure_alarms(Trial(0), sound, WORLDS[0])
+    assert sound.values["alarms"] == 1.0
+    measure_break(Trial(0), broken, FEET[0])
+    assert broken.values["trotting-others"] == 1.0
+    assert broken.values["trotting-named"] == 0.0
 
 
 def test_on_three_legs_the_raised_one_breaks() -> None:
