@@ -22,13 +22,14 @@ from jaxtyping import Float, Shaped
 from controller.behaviours import DAMPING
 from controller.bridges.unitree import messages
 from controller.bridges.unitree.messages import FEET_SWAPPED, JOINTS_SWAPPED, MOTORS, decode_message
+from controller.modes import LYING_TILT
 from controller.pacing import LogThrottle
 from go2_wbc.errors import CommandError
 from go2_wbc.plant.sensors import ImuSample
 from go2_wbc.robot.estimator import SensorReading
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand, RobotState
-from go2_wbc.validation import POSITIVE, ranged
+from go2_wbc.validation import POSITIVE, ranged, retires
 
 _log = logging.getLogger(__name__)
 
@@ -216,7 +217,13 @@ _BOUNDS: Final = (
 )
 
 
+RAMP_TIME: Final = 0.5  #: Time [s] over which torque and stiffness grow after the robot was limp
+LIMP_TIME: Final = 0.3  #: Time [s] of limpness after which they have to grow anew
+LYING_HEIGHT: Final = 0.16  #: Height [m] of the base over the ground below which the robot lies
+
+
 @dataclass(frozen=True, slots=True)
+@retires(ramp_time=RAMP_TIME, limp_time=LIMP_TIME, lying_height=LYING_HEIGHT, lying_tilt=LYING_TILT)
 @ranged(POSITIVE)
 class GuardConfig:
     """When a command is softened, and when the robot is damped for good."""
@@ -226,11 +233,6 @@ class GuardConfig:
     hang_limit: float = 0.1  #: time [s] without a command of the controller after which it is
     tilt_limit: float = 1.2  #: tilt [rad] of the trunk from which on it is
     joint_margin: float = 0.15  #: angle [rad] beyond a joint's limit from which on it is
-    ramp_time: float = 0.5
-    """Time [s] over which torque and stiffness grow after the robot was limp."""
-    limp_time: float = 0.3  #: time [s] of limpness after which they have to grow anew
-    lying_height: float = 0.16  #: height [m] of the base over the ground below which the robot lies
-    lying_tilt: float = 0.5  #: tilt [rad] up to which it lies on its belly
 
 
 def is_passive(command: JointCommand) -> bool:
@@ -284,9 +286,9 @@ class Guards:
                 self._active_since, self._limp_since = None, state.time
             return command
         if self._active_since is None:
-            has_rested = state.time - self._limp_since > self._config.limp_time
+            has_rested = state.time - self._limp_since > LIMP_TIME
             self._active_since = state.time if has_rested else -math.inf
-        share = min(1.0, (state.time - self._active_since) / self._config.ramp_time)
+        share = min(1.0, (state.time - self._active_since) / RAMP_TIME)
         q = state.joint_positions
         tau = np.clip(command.tau, *self._motor.limits(state.joint_velocities))
         tau = np.where(q >= self._upper, np.minimum(tau, 0.0), tau)

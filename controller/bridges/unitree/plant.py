@@ -18,6 +18,7 @@ from controller.behaviours import DAMPING
 from controller.bridges.unitree import LOOPBACK, low_level, require_dds
 from controller.bridges.unitree.messages import LOW_STATE, encode_message
 from controller.bridges.unitree.sport_api import SWITCHER_SERVICE, Code, SwitcherApi
+from controller.modes import LYING_TILT
 from controller.pacing import SWITCH_INTERVAL, BackgroundLog
 from go2_wbc.errors import ClosedError, CommandError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant
@@ -312,7 +313,7 @@ class UnitreePlant(Plant):
         _, p_feet = self._model.forward_kinematics(state.q)
         height = float(state.q[2] - p_feet[:, 2].min()) + self._model.foot_radius
         tilt = max(state.tilt, self._own_view.tilt)
-        if not (height < self._config.lying_height and tilt < self._config.lying_tilt):
+        if not (height < low_level.LYING_HEIGHT and tilt < LYING_TILT):
             raise PlantError(
                 f"the robot must lie on its belly at the start; its base is {height:.2f} m above "
                 f"its feet, tilted by {np.degrees(tilt):.0f} deg"

@@ -9,6 +9,7 @@ import pytest
 from controller.behaviours import DAMPING
 from controller.bridges.unitree import messages
 from controller.bridges.unitree.low_level import (
+    RAMP_TIME,
     RELEASE,
     SILENCE,
     CommandGate,
@@ -160,7 +161,7 @@ def test_a_closed_gate_lets_nothing_in_but_does_not_cut_off_who_is_inside(
 TUCKED_JOINTS = find_profile().tucked_joints
 
 TAU = JointCommand.torque(np.full(12, 5.0))
-RAMP = GuardConfig().ramp_time
+RAMP = RAMP_TIME
 
 
 @pytest.fixture
@@ -235,3 +236,5 @@ def test_only_damping_is_passive_and_what_is_not_finite_or_no_limit_is_refused()
         require_sane(replace(TAU, kp=np.full(12, np.nan)))
     with pytest.raises(ConfigError, match="stale_limit"):
         GuardConfig(stale_limit=0.0)
+    with pytest.warns(FutureWarning, match=r"ramp_time has no effect any more: it is always 0\.5"):
+        assert GuardConfig(**{"ramp_time": 1.0}) == GuardConfig()
