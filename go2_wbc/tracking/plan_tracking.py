@@ -42,13 +42,14 @@ from go2_wbc.records import Array3, Array6, Record, packed
 from go2_wbc.reference import JOINTS, STANCE, Anchor, Reference, Target, TrackedPoint, sag_and_lean
 from go2_wbc.robot.rotations import log_rotation, rotation_from_quaternion, yaw_rotation
 from go2_wbc.robot.state import Snapshot
+from go2_wbc.tracking.foot_placement import step_aside
 from go2_wbc.tracking.landing import Landing, Landings, land
 from go2_wbc.tracking.plan_curves import StanceLoad
 from go2_wbc.tracking.trunk_firmness import hold_firmly
 
 FIRM_AFTER = 0.15
-"""Time [s] on three feet or more after which the trunk is held firmly: a trot stands on four
-between its steps, and a trunk that rolled by 26 deg meanwhile went 38 mm aside as it was held."""
+"""Time [s] on three feet or more after which the trunk is no longer held as in a stride: a trot
+stands on four between its steps."""
 PAIR = 2  #: Feet that hold a trunk along the line between them, and not across it
 HEIGHT_PER_WEIGHT = 0.00055
 """Correction [m/N] that a payload's weight takes; this and the next two as found with 2 to 6 kg, up
@@ -183,13 +184,15 @@ def follow(
     error = np.empty(6)
     compare(now, target, error)
     note(now, error, s, target)
+    step_aside(now, error, target)
     is_held = standing_feet(target) > PAIR
     correct(now, error, dt if is_held else 0.0, s.correction, target)
     c = s.correction
     c.held = c.held + dt if is_held else 0.0
     is_solved = target.force_weight != 0.0  # with forces of its own
-    if c.is_firm and c.held >= FIRM_AFTER and not is_solved:
-        lead = hold_firmly(now, error, c.offset, dt, c.friction, target)
+    if c.is_firm and not is_solved:
+        in_stride = c.held < FIRM_AFTER
+        lead = hold_firmly(now, error, c.offset, dt, c.friction, target, in_stride)
         for i in range(3):
             target.p_world[i] += lead[i]
         turn_by((lead[3], lead[4], lead[5]), target.R_world_base)

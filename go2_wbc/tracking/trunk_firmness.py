@@ -18,6 +18,10 @@ measured one: it reverses with the plan, before the robot is stuck, is zero at r
 excite a robot without friction, for which c becomes negative. The integral of ``planning.trunk``
 has to unwind at every reversal instead, and is for constant disturbances.
 
+In a stride, on two feet or just after, the gains are lower and nothing is learned. No joint gives a
+moment about the line between two feet, so what is asked for against friction moves the CoM instead.
+A trunk that rolled by 63 deg in 0.35 s lagged by 9 deg without these gains, by 5 with them.
+
 Solved parts of a plan, jumps above all, keep their targets: a trunk that lands late is not held by
 friction, and hops were 25 mm off with what they learned from it, instead of 15.
 """
@@ -36,6 +40,8 @@ DAMPING = (0.0, 0.0, 6.0, 50.0, 12.0, 15.0)
 """K [1/s^2] and D [1/s], beside the gains of the tasks: of ahead, left, up, roll, pitch, yaw. By
 them friction of 0.2 N m leaves 0.6 deg of roll and less of the others; commands may be 12 ms late.
 Ahead and aside a push is to move a robot that then steps as it did."""
+IN_STRIDE = 0.25
+"""Share of them in a stride. With what is learned a trot was twice as far beside its plan."""
 LEARNING = 10.0  #: Rate [1/s]
 SLOW_WAY, SLOW_TURN = 0.003, 0.01
 """Planned speed [m/s], [rad/s] from which on c counts; 1 deg in 1.2 s is 0.02 rad/s at most."""
@@ -45,7 +51,13 @@ MOST_WAY, MOST_TURN = 0.009, 0.03
 
 @subroutine
 def hold_firmly(
-    now: Snapshot, error: Array6, offset: Array6, dt: float, learned: Array6, target: Target
+    now: Snapshot,
+    error: Array6,
+    offset: Array6,
+    dt: float,
+    learned: Array6,
+    target: Target,
+    in_stride: bool,
 ) -> Array6:
     """Add K e + D e' to the target's accelerations; returns ``c s``, in the world.
 
@@ -56,8 +68,11 @@ def hold_firmly(
         dt: since the last tick [s].
         learned: c, along the axes of the base, which is changed.
         target: what is asked for.
+        in_stride: whether only two feet stand, or have stood just now.
     """
-    R, lead = now.R_world_base, np.zeros(6)
+    R, lead, share = now.R_world_base, np.zeros(6), 1.0
+    if in_stride:
+        dt, share = 0.0, IN_STRIDE
     for n in range(6):
         i, first = n % 3, n - n % 3
         off, held, wanted, moving = 0.0, 0.0, 0.0, now.v[n]
@@ -75,8 +90,8 @@ def hold_firmly(
         sign = np.tanh(wanted / (SLOW_WAY if n < 3 else SLOW_TURN))
         most = MOST_WAY if n < 3 else MOST_TURN
         learned[n] = min(max(learned[n] + LEARNING * dt * sign * off, -most), most)
-        ahead = learned[n] * sign
-        more = STIFFNESS[n] * (off + held + ahead) + DAMPING[n] * (wanted - moving)
+        ahead = 0.0 if in_stride else learned[n] * sign
+        more = share * (STIFFNESS[n] * (off + held + ahead) + DAMPING[n] * (wanted - moving))
         for k in range(3):
             lead[first + k] += R[k, i] * ahead
             if n >= 3:
