@@ -5,7 +5,7 @@ its error e grows by itself; what it comes to is told by the error of the diverg
 motion, e + v / omega (Takenaka, Matsumoto & Yoshiike, *Real time motion generation and control for
 biped robot*, IROS 2009). Feet that land aside by that stand below the CoM again as it was planned.
 The two lines of a trot are both nearer to the way ahead than to the way aside, so that without
-this a trot has next to no stiffness aside: the friction of a rolling trunk's joints took it 50 mm.
+this a trot has next to no stiffness aside: the friction of a rolling trunk's joints took it 46 mm.
 """
 
 from __future__ import annotations

@@ -8,9 +8,9 @@ from hypothesis.extra import numpy as arrays
 
 from go2_wbc.reference import Target
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.state import Snapshot
 from go2_wbc.tracking.trunk_firmness import (
     DAMPING,
+    IN_STRIDE,
     LEARNING,
     MOST_TURN,
     MOST_WAY,
@@ -37,8 +37,11 @@ def moving(rates: np.ndarray, *, is_com: bool = True) -> Target:
     return Target(is_com=is_com, v_world=v[:3], w_world=v[3:])
 
 
-def held(target: Target, error: np.ndarray, learned: np.ndarray, now: Snapshot = NOW) -> np.ndarray:
-    return np.array(hold_firmly(now, in_world(error), np.zeros(6), TICK, learned, target))
+def held(
+    target: Target, error: np.ndarray, learned: np.ndarray, *, in_stride: bool = False
+) -> np.ndarray:
+    lead = hold_firmly(NOW, in_world(error), np.zeros(6), TICK, learned, target, in_stride)
+    return np.array(lead)
 
 
 @given(vectors, vectors)
@@ -68,16 +71,26 @@ def test_what_a_stuck_trunk_teaches_turns_round_with_the_plan(axis: int, way: fl
     assert learned[axis] == MOST[axis], "no more is stored up"
 
 
+@pytest.mark.parametrize("in_stride", [True, False])
 @pytest.mark.parametrize("is_com", [True, False])
-def test_a_trunk_off_its_plan_is_pulled_by_gains_along_its_own_axes(*, is_com: bool) -> None:
+def test_a_trunk_off_its_plan_is_pulled_by_gains_along_its_own_axes(
+    *, is_com: bool, in_stride: bool
+) -> None:
     rng = np.random.default_rng(2)
     error, rates = rng.uniform(-0.1, 0.1, (2, 6))
     target, learned = moving(rates, is_com=is_com), np.zeros(6)
-    lead = held(target, error, learned).reshape(2, 3) @ NOW.R_world_base
+    lead = held(target, error, learned, in_stride=in_stride).reshape(2, 3) @ NOW.R_world_base
     v = NOW.state.v[:6].copy()
     if is_com:
         v[:3] = NOW.R_world_base.T @ NOW.v_world_com
     a = np.array(STIFFNESS) * (error + lead.ravel()) + np.array(DAMPING) * (rates - v)
-    wanted = in_world(a)
+    wanted = in_world(IN_STRIDE * a if in_stride else a)
     np.testing.assert_allclose(target.a_world, wanted[:3], atol=1e-9)
     np.testing.assert_allclose(target.dw_world, wanted[3:], atol=1e-9)
+
+
+def test_in_stride_nothing_is_learned_and_nothing_of_it_is_added() -> None:
+    learned = 0.5 * MOST
+    lead = held(moving(np.full(6, FAST)), np.full(6, 0.1), learned, in_stride=True)
+    assert not lead.any()
+    np.testing.assert_array_equal(learned, 0.5 * MOST)
