@@ -42,7 +42,7 @@ from go2_wbc.records import Array3, Array6, Record, packed
 from go2_wbc.reference import JOINTS, STANCE, Anchor, Reference, Target, TrackedPoint, sag_and_lean
 from go2_wbc.robot.rotations import log_rotation, rotation_from_quaternion, yaw_rotation
 from go2_wbc.robot.state import Snapshot
-from go2_wbc.tracking.foot_placement import step_aside
+from go2_wbc.tracking.foot_placement import place_feet
 from go2_wbc.tracking.landing import Landing, Landings, land
 from go2_wbc.tracking.plan_curves import StanceLoad
 from go2_wbc.tracking.trunk_firmness import hold_firmly
@@ -184,7 +184,7 @@ def follow(
     error = np.empty(6)
     compare(now, target, error)
     note(now, error, s, target)
-    step_aside(now, error, target)
+    place_feet(now, error, target)
     is_held = standing_feet(target) > PAIR
     correct(now, error, dt if is_held else 0.0, s.correction, target)
     c = s.correction

@@ -1,4 +1,4 @@
-"""Two feet that swing come down aside by what the CoM is off its plan, across their line."""
+"""Two feet that swing come down where the CoM goes, across their line, and keep to their way."""
 
 from dataclasses import replace
 
@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 
 from go2_wbc.reference import LegTask, Reference, Target, TrackedPoint
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.tracking.foot_placement import FALLING, MOST_ASIDE, step_aside
+from go2_wbc.tracking.foot_placement import (
+    DAMPING,
+    FALLING,
+    MOST_ASIDE,
+    STIFFNESS,
+    place_feet,
+)
 from tests.engine_helpers import holding_reference, random_state
 
 NOW = RobotModel().snapshot(random_state(np.random.default_rng(4)))
@@ -27,7 +33,7 @@ def placed(
     target.is_com = is_com
     target.v_world[:] = NOW.v_world_com - speed
     feet = target.p_world_feet.copy()
-    step_aside(NOW, np.concatenate([-off, np.zeros(3)]), target)
+    place_feet(NOW, np.concatenate([-off, np.zeros(3)]), target)
     return target.p_world_feet - feet, target
 
 
@@ -43,6 +49,9 @@ def test_feet_go_where_the_com_goes_across_their_line_and_no_farther_than_allowe
     wanted = np.clip(asked, -MOST_ASIDE, MOST_ASIDE) * across
     for leg in (1, 2):
         np.testing.assert_allclose(moved[leg], [*wanted, 0.0], atol=1e-12)
+        late = target.v_world_feet[leg] - NOW.v_world_feet[leg]
+        pull = STIFFNESS * (target.p_world_feet[leg] - NOW.p_world_feet[leg]) + DAMPING * late
+        np.testing.assert_allclose(target.a_world_feet[leg] - PLAN.a_world_feet[leg], pull)
     assert not moved[[0, 3]].any()
 
 
@@ -62,6 +71,7 @@ def test_other_feet_keep_their_goals(
     legs: tuple[LegTask, ...], is_com: bool, weight: float
 ) -> None:
     plan = replace(PLAN, legs=legs, force_weight=weight)
-    moved, _ = placed(np.full(3, 0.01), np.zeros(3), plan, is_com=is_com)
+    moved, target = placed(np.full(3, 0.01), np.zeros(3), plan, is_com=is_com)
     assert not moved.any()
+    np.testing.assert_array_equal(target.a_world_feet, plan.a_world_feet)
     assert PLAN.body.point is TrackedPoint.COM
