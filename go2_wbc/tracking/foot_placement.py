@@ -7,8 +7,8 @@ biped robot*, IROS 2009). Feet that land aside by that stand below the CoM again
 The two lines of a trot are both nearer to the way ahead than to the way aside, so that without
 this a trot has next to no stiffness aside: the friction of a rolling trunk's joints took it 46 mm.
 
-The same friction holds the feet off their way, up to 20 mm at the touchdown where the trunk yaws
-fast. Their gains are therefore raised to those of legs that follow joints, which leaves 10.
+The same friction holds the feet off their way, up to 19 mm at the touchdown where the trunk yaws
+fast. Their gains are therefore raised to those of legs that follow joints, which leaves 12.
 """
 
 from __future__ import annotations
@@ -24,9 +24,7 @@ from go2_wbc.robot.state import Snapshot
 FALLING = 0.17  #: Time constant 1 / omega [s] of the pendulum: sqrt(z / g) of a CoM at 0.29 m
 MOST_ASIDE = 0.008
 """Distance [m] by which feet are placed aside at most: half of what an author notices of a foot
-that has landed. As they stand for 0.2 s, it moves the CoM by as much, twice as fast at the end."""
-
-
+that has landed. While they stand, for 0.2 s, it moves the CoM by three quarters of that."""
 STIFFNESS, DAMPING = 400.0, 14.0
 """What is added to the gains of swinging feet [1/s^2], [1/s]: with ``WbcConfig.swing_foot``, it is
 ``WbcConfig.leg_posture``."""
