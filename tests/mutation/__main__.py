@@ -6,10 +6,13 @@ import sys
 import tempfile
 import tomllib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import groupby
 from pathlib import Path
 
-from tests.mutation.operators import Mutant, draw, mutants_of
+from tests.mutation.operators import Mutant, apart, draw, mutants_of
 from tests.mutation.runner import Outcome, Sandbox, nearest_tests, own_tests
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -17,7 +20,7 @@ PACKAGES: tuple[str, ...] = ("go2_wbc", "motions", "viz", "controller")
 # Not mutated: their tests need ROS 2 or DDS.
 LEFT_OUT = ("controller/bridges", "controller/cli/bridges")
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
-# Fast tests that take long or need a browser; they run with the whole suite only.
+# Fast tests that take long or need a browser: they are near to no module.
 LATE = ("test_seeded_faults.py", "test_pytest_plugin.py", "test_*browser.py")
 STAGES = NEAR, PACKAGE, SUITE = "module", "package", "suite"
 ALIVE, TIMEOUT = "alive", "timeout"
@@ -47,10 +50,16 @@ def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
         mutants = draw(mutants, options.n, options.seed)
     mutants.sort(key=lambda mutant: packages.index(mutant.path.split("/")[0]))
     with tempfile.TemporaryDirectory(prefix="mutation_") as folder:
-        judge = Judge(Sandbox(root, Path(folder, "tree")), last=options.until)
+        judge = Judge(Sandbox(root, Path(folder, "tree")))
         for mutant in mutants:
             if options.again or mutant.name not in results.latest:
-                results.add(mutant, *judge.judge(mutant))
+                results.add(mutant, NEAR, *judge.judge(mutant))
+        for stage in STAGES[1 : STAGES.index(options.until) + 1]:
+            left = [mutant for mutant in mutants if results.is_left(mutant, stage)]
+            for _, together in groupby(sorted(left, key=results.company), results.company):
+                for group in apart(together):
+                    for mutant, told, outcome in judge.judge_together(group, stage):
+                        results.add(mutant, stage, told, outcome)
     sys.stdout.write(results.table())
     return 1 if results.alive() else 0
 
@@ -63,67 +72,94 @@ def package_mutants(root: Path, package: str) -> list[Mutant]:
 
 
 class Judge:
-    """Tests a mutant: by its module's own tests, its package's fast ones, then the whole suite.
+    """Tests a mutant: by its module's nearest tests, its package's fast ones, the whole suite.
 
     Most are noticed by the module's own tests, which run first, and plain: compiling takes long.
+    What the nearest tests let live meets the others together with its like: a run of all of them
+    tells which tests fail, and each mutant meets those alone. One that hides another's fault from
+    a test lets it live: the share killed is never told too high.
     """
 
-    def __init__(self, sandbox: Sandbox, *, last: str) -> None:
-        self._sandbox, self._last = sandbox, last
+    def __init__(self, sandbox: Sandbox) -> None:
+        self._sandbox = sandbox
         self._passing: dict[tuple[str, bool], bool] = {}  # without any mutant; and plain
         tests = sandbox.home / "tests"
         late = (file for pattern in LATE for file in tests.rglob(pattern))
         self._late = {str(file.relative_to(sandbox.home)) for file in late}
 
     def judge(self, mutant: Mutant) -> tuple[str, Outcome]:
-        """Which tests noticed it, and what they said."""
+        """Whether the nearest tests notice it, and what they say."""
         near = [n for n in nearest_tests(self._sandbox.home, mutant.path) if n not in self._late]
-        stages = [
-            (NEAR, near, self._late, "not slow"),
-            (PACKAGE, [f"tests/{mutant.path.split('/')[0]}"], self._late | {*near}, "not slow"),
-            *((SUITE, ["tests"], set[str](), marker) for marker in ("not slow", "slow")),
-        ]
-        if own := [name for name in near if name in own_tests(self._sandbox.home, mutant.path)]:
-            outcome = self._test(mutant, own, self._late, "not slow", LIMITS[PLAIN], plain=True)
-            if not outcome.passed and not outcome.is_late:
-                return NEAR, outcome
-        outcome = Outcome(True, "", 0.0)
-        for stage, targets, excluded, marker in stages:
-            if targets and STAGES.index(stage) <= STAGES.index(self._last):
-                outcome = self._test(mutant, targets, excluded, marker, LIMITS[stage])
-                if not outcome.passed:
-                    return TIMEOUT if outcome.is_late else stage, outcome
-        return ALIVE, outcome
+        own = [name for name in near if name in own_tests(self._sandbox.home, mutant.path)]
+        outcome = Outcome(True, (), 0.0)
+        for targets, limit, plain in ((own, LIMITS[PLAIN], True), (near, LIMITS[NEAR], False)):
+            if targets:
+                outcome = self._test([mutant], targets, "not slow", limit, plain=plain)
+                if not outcome.passed and not outcome.is_late:
+                    return NEAR, outcome
+        return TIMEOUT if outcome.is_late else ALIVE, outcome
+
+    def judge_together(
+        self, mutants: list[Mutant], stage: str
+    ) -> Iterator[tuple[Mutant, str, Outcome]]:
+        """Of each mutant of a package what a further stage says."""
+        targets = ["tests" if stage == SUITE else f"tests/{mutants[0].path.split('/')[0]}"]
+        marker = "slow or not slow" if stage == SUITE else "not slow"
+        whole = self._test(mutants, targets, marker, LIMITS[stage], to_the_end=True)
+        if whole.passed or whole.names_tests:
+            for mutant in mutants:
+                outcome = whole
+                if not whole.passed:
+                    outcome = self._test([mutant], [*whole.failed], marker, LIMITS[stage])
+                yield mutant, _told(outcome, stage), outcome
+        elif len(mutants) == 1:
+            yield mutants[0], _told(whole, stage), whole
+        else:  # one of them ends the process, or never ends
+            half = len(mutants) // 2
+            for part in (mutants[:half], mutants[half:]):
+                yield from self.judge_together(part, stage)
 
     def _test(
         self,
-        mutant: Mutant,
+        mutants: list[Mutant],
         targets: list[str],
-        excluded: set[str],
         marker: str,
         limit: float,
         *,
         plain: bool = False,
+        to_the_end: bool = False,
     ) -> Outcome:
         sandbox = self._sandbox
         failing = {name for (name, how), ok in self._passing.items() if how == plain and not ok}
-        source = (sandbox.home / mutant.path).read_bytes()
-        sandbox.write(mutant.path, mutant.applied(source))
-        outcome = sandbox.test(targets, marker, sorted(excluded | failing), limit, plain=plain)
-        sandbox.write(mutant.path, source)
+        sources = {mutant.path: (sandbox.home / mutant.path).read_bytes() for mutant in mutants}
+        changed = dict(sources)
+        for mutant in sorted(mutants, key=lambda mutant: -mutant.start):
+            changed[mutant.path] = mutant.applied(changed[mutant.path])
+        for path, source in changed.items():
+            sandbox.write(path, source)
+        ask = partial(sandbox.test, marker=marker, limit=limit, plain=plain)
+        outcome = ask(targets, excluded=failing, to_the_end=to_the_end)
+        for path, source in sources.items():
+            sandbox.write(path, source)
         if outcome.passed or outcome.is_late:
             return outcome
-        is_told = outcome.failed.startswith("tests/")  # else something has ended the process
-        asked = [outcome.failed] if is_told else targets
-        key = (" ".join(asked), plain)
-        if key not in self._passing:
-            good = sandbox.test(asked, marker, excluded, limit, plain=plain)
-            self._passing[key] = good.passed or not (is_told or good.failed.startswith("exit"))
-            if not self._passing[key] and not is_told:
+        asked = [*outcome.failed] if outcome.names_tests else targets
+        if unknown := [name for name in asked if (name, plain) not in self._passing]:
+            good = ask(unknown, excluded=(), to_the_end=True)
+            if not (good.passed or good.is_late or good.names_tests):
                 raise RuntimeError(f"without a mutant the tests do not run either: {good.failed}")
-            if not self._passing[key]:  # it fails anyway: try again without it
-                return self._test(mutant, targets, excluded, marker, limit, plain=plain)
-        return outcome
+            bad = {*good.failed} if outcome.names_tests else set[str]()
+            self._passing |= {(name, plain): name not in bad for name in unknown}
+        noticed = tuple(name for name in asked if self._passing[name, plain])
+        if to_the_end and outcome.names_tests:
+            return replace(outcome, passed=not noticed, failed=noticed)
+        if noticed:
+            return outcome
+        return self._test(mutants, targets, marker, limit, plain=plain)  # without those tests
+
+
+def _told(outcome: Outcome, stage: str) -> str:
+    return ALIVE if outcome.passed else TIMEOUT if outcome.is_late else stage
 
 
 class Results:
@@ -138,12 +174,25 @@ class Results:
         entries = tomllib.loads(EQUIVALENT.read_text()).get("equivalent", [])
         self._equivalent = {entry["mutant"] for entry in entries}
 
-    def add(self, mutant: Mutant, stage: str, outcome: Outcome) -> None:
-        """Append a result."""
-        told = {"failed": outcome.failed, "seconds": round(outcome.seconds, 1)}
-        self.latest[mutant.name] = {"mutant": mutant.name, "stage": stage, **told}
+    def add(self, mutant: Mutant, until: str, stage: str, outcome: Outcome) -> None:
+        """Append what has noticed a mutant, or nothing, of the tests up to a stage."""
+        told = {"failed": " ".join(outcome.failed[:1]), "seconds": round(outcome.seconds, 1)}
+        head = {"mutant": mutant.name, "stage": stage, "until": until}
+        self.latest[mutant.name] = {**head, **told}
         with self._file.open("a") as stream:
             stream.write(json.dumps(self.latest[mutant.name]) + "\n")
+
+    def is_left(self, mutant: Mutant, stage: str) -> bool:
+        """Whether a mutant has yet to meet the tests of a stage, as no nearer ones noticed it."""
+        record = self.latest[mutant.name]
+        if mutant.name in self._equivalent or record["stage"] not in (ALIVE, TIMEOUT):
+            return False
+        return STAGES.index(record["until"]) < STAGES.index(stage)
+
+    def company(self, mutant: Mutant) -> str:
+        """What those share that meet tests together: a package; what may hang is alone."""
+        is_late = self.latest[mutant.name]["stage"] == TIMEOUT
+        return mutant.name if is_late else mutant.path.split("/")[0]
 
     def alive(self) -> set[str]:
         """The mutants that no test noticed, although they are not equivalent."""

@@ -9,7 +9,7 @@ What only talks is left alone: annotations, decorators, f-strings, raised errors
 import ast
 import copy
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -68,6 +68,22 @@ def mutants_of(source: bytes, path: str) -> list[Mutant]:
             weight = ((function.end_lineno or 0) - function.lineno + 1) / len(sites)
             mutants.append(Mutant(name, path, weight, start, end, after))
     return mutants
+
+
+def apart(mutants: Iterable[Mutant]) -> list[list[Mutant]]:
+    """Groups of which each can be applied as a whole: no two change the same place."""
+    groups: list[list[Mutant]] = []
+    for m in mutants:
+        free = (g for g in groups if not any(m.path == o.path and _meet(m, o) for o in g))
+        if (group := next(free, None)) is None:
+            groups.append([m])
+        else:
+            group.append(m)
+    return groups
+
+
+def _meet(one: Mutant, other: Mutant) -> bool:
+    return one.start < other.end and other.start < one.end
 
 
 def draw(mutants: list[Mutant], count: int, seed: int) -> list[Mutant]:

@@ -34,9 +34,14 @@ class Outcome:
     """What tests said."""
 
     passed: bool  #: whether all did
-    failed: str  #: the first that did not, or how their process ended
+    failed: tuple[str, ...]  #: those that did not, or how their process ended
     seconds: float  #: of CPU time
     is_late: bool = False  #: whether they were stopped: their time was up
+
+    @property
+    def names_tests(self) -> bool:
+        """Whether tests failed; else something has ended their process."""
+        return bool(self.failed) and self.failed[0].startswith("tests/")
 
 
 class Sandbox:
@@ -67,15 +72,18 @@ class Sandbox:
         limit: float,
         *,
         plain: bool = False,
+        to_the_end: bool = False,
     ) -> Outcome:
         """Run tests up to the first failure, for at most ``limit`` seconds of CPU time.
 
         With ``plain`` kernels run as the Python that they are written in: none is compiled anew.
+        With ``to_the_end`` failures stop nothing.
         """
         told = self.home.with_suffix(".txt")
         command = [*targets, "-q", "-m", marker, "-rfE", "-p", "no:cacheprovider"]
         command += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # libraries are loaded
-        command += ["-x", *(f"--deselect={name}" for name in excluded)]
+        command += ["--continue-on-collection-errors" if to_the_end else "-x"]
+        command += [f"--deselect={name}" for name in excluded]
         before = _used()
         process = multiprocessing.get_context("fork").Process(
             target=_run_pytest, args=(self.home, told, command, int(limit), plain)
@@ -88,10 +96,12 @@ class Sandbox:
                 os.killpg(process.pid or 0, signal.SIGKILL)
                 process.join()
         code, text = process.exitcode or 0, told.read_text()
-        failed = [*_FAILED.findall(text), f"exit code {code}"][0]
-        passed = code in (0, _NO_TESTS) and text.endswith(_END)
+        has_ended = text.endswith(_END)
+        failed = tuple(_FAILED.findall(text)) if has_ended else ()
+        passed = code in (0, _NO_TESTS) and has_ended
         is_late = code in (-signal.SIGXCPU, -signal.SIGKILL)
-        return Outcome(passed, "" if passed else failed, _used() - before, is_late)
+        told = () if passed else failed or (f"exit code {code}",)
+        return Outcome(passed, told, _used() - before, is_late)
 
 
 def _run_pytest(home: Path, told: Path, command: list[str], limit: int, plain: bool) -> None:
