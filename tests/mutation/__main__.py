@@ -93,16 +93,16 @@ class Judge:
         near = [name for name in nearest_tests(home, mutant.path) if name not in self._late]
         own = [name for name in near if name in own_tests(home, mutant.path)]
         others = [name for name in near if name not in own]
-        outcomes = list[Outcome]()
-        for targets, limit, plain in ((own, LIMITS[PLAIN], True), (others, LIMITS[NEAR], False)):
-            if targets:
-                outcome = self._test([mutant], targets, "not slow", limit, plain=plain)
-                if not outcome.passed and not outcome.is_late:
-                    return NEAR, outcome
-                outcomes.append(outcome)
-        if outcomes and all(outcome.is_late for outcome in outcomes):
-            return TIMEOUT, outcomes[-1]
-        return ALIVE, outcomes[-1] if outcomes else Outcome(True, (), 0.0)
+        runs = [(own, PLAIN), (own, NEAR), ([name for name in near if name not in own], NEAR)]
+        outcome, hangs = Outcome(True, (), 0.0), False
+        for targets, how in runs:
+            if not targets or (targets is own and how == NEAR and not outcome.is_late):
+                continue  # what has passed plain has passed
+            told = self._test([mutant], targets, "not slow", LIMITS[how], plain=how == PLAIN)
+            outcome, hangs = told, hangs or (targets is own and how == NEAR and told.is_late)
+            if not outcome.passed and not outcome.is_late:
+                return NEAR, outcome
+        return TIMEOUT if hangs else ALIVE, outcome
 
     def judge_together(
         self, mutants: list[Mutant], stage: str
