@@ -92,7 +92,6 @@ class Judge:
         home = self._sandbox.home
         near = [name for name in nearest_tests(home, mutant.path) if name not in self._late]
         own = [name for name in near if name in own_tests(home, mutant.path)]
-        others = [name for name in near if name not in own]
         runs = [(own, PLAIN), (own, NEAR), ([name for name in near if name not in own], NEAR)]
         outcome, hangs = Outcome(True, (), 0.0), False
         for targets, how in runs:
