@@ -175,6 +175,7 @@ def test_fast_ticks_are_solved_as_recorded() -> None:
     assert_as_recorded(FILE, "fast", kept(rows))
 
 
+@pytest.mark.filterwarnings("ignore::FutureWarning")  # of keys that have no effect any more
 def test_wrong_keys_of_files_are_refused_in_the_words_recorded() -> None:
     def refused(part: object, place: tuple[str, ...]) -> Iterator[str]:
         for name in part.__dataclass_fields__:  # type: ignore[attr-defined]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from go2_wbc.errors import Go2WbcError
+from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
 from motions import (
@@ -21,6 +22,7 @@ from motions import (
     suggest,
 )
 from motions.feasibility.check import CheckedMotion
+from motions.plan.compiled_plan import placed
 from tests.held.make import PLANS, STORED, timeline
 from tests.motions.mutations import MUTATORS
 from tests.recorded import assert_as_recorded
@@ -155,6 +157,12 @@ def test_a_stored_plan_is_judged_and_shown_as_recorded(
     recording = checked.recording()
     arrays = {name: getattr(recording, name) for name in ("q", "tau", "stance", "support_margin")}
     forces = {f"forces {f.name}": getattr(checked.forces, f.name) for f in fields(checked.forces)}
+    plan = checked.plan
+    assert isinstance(plan, CompiledPlan)
+    for index, span in enumerate(plan.dynamic):
+        moved = placed(span.trajectory, Anchor(np.array([0.4, -0.3, 0.05]), 0.7))
+        for name in ("q", "v", "forces", "gains", "p_feet"):
+            arrays[f"placed {index} {name}"] = getattr(moved, name)
     case = f"stored {kind}, {'usual' if world == World() else 'hard'}"
     assert_as_recorded(FILE, case, {**told_of(checked), **arrays, **forces})
 
