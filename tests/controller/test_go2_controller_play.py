@@ -121,6 +121,8 @@ def test_a_plant_that_may_be_a_robot_is_not_sent_a_dynamic_motion_and_what_simul
     plant = GroundTruth(MujocoPlant())
     assert not plant.is_hardware
     assert LivePlant().is_hardware
+    assert not StillPlant().is_live
+    assert not StillPlant().is_hardware
     plant.close()
 
 

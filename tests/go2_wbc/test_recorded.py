@@ -5,6 +5,7 @@ What they are given is made here, and depends on nothing that a simulator does.
 
 from collections import defaultdict
 from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,26 @@ from go2_wbc.config import Config, override
 from go2_wbc.contacts import GAITS, Gait
 from go2_wbc.errors import Go2WbcError, QpInfeasible
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
+from go2_wbc.planning.envelopes import GaitChoice
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.planning.trunk import LEVEL, BodyPose
 from go2_wbc.plant.faults import FaultKind, Faults, InjectedFault
-from go2_wbc.plant.terrain import Blocks, Slope, Stairs, Terrain, Waves
+from go2_wbc.plant.sensors import ImuSample, Proprioception, SensorErrors, SensorNoise
+from go2_wbc.plant.terrain import (
+    BOTH,
+    DOWN,
+    Blocks,
+    Boxes,
+    Course,
+    Gap,
+    Patch,
+    Ramp,
+    Slope,
+    Stairs,
+    Stones,
+    Terrain,
+    Waves,
+)
 from go2_wbc.reference import LegTask, Reference
 from go2_wbc.robot.estimator import EstimatorConfig, SensorReading, StateEstimator
 from go2_wbc.robot.model import RobotModel
@@ -173,6 +190,57 @@ def test_fast_ticks_are_solved_as_recorded() -> None:
     solved = [PLAIN.solve(*case) for case in fast_cases(MODEL, 30, seed=4)]
     rows = {"tau": [one.tau for one in solved], "forces": [one.forces for one in solved]}
     assert_as_recorded(FILE, "fast", kept(rows))
+
+
+TERRAINS: tuple[Terrain, ...] = (
+    *(Boxes(), Boxes(0.1, 0.3, 7, 2.0, 0.4, seed=3), Stairs(), Stairs(0.1, 3, 0.31, 0.5, DOWN)),
+    *(Stairs(0.1, 2, way=BOTH, landing=1.3), Stairs(is_open=True), Blocks(), Blocks(0.2, 0.5, 0.3)),
+    *(Slope(0.2), Ramp(0.2), Ramp(0.1, 0.7, 0.4), Waves(), Waves(0.1, 0.7, 2, 0.3)),
+    *(Stones(), Stones(0.2, 0.15, 4, 0.3, 0.03, 5), Gap(), Gap(0.3, 0.5, 0.4), Patch()),
+    *(Course((Ramp(0.2), Gap(0.2), Blocks(0.1))), *map(Course.drawn, range(6))),
+)
+
+
+def test_terrains_are_those_recorded() -> None:
+    told = dict[str, Any]()
+    for index, one in enumerate(TERRAINS):
+        blocks = [(*fields_of(block),) for block in one.blocks()]
+        told[f"{index} {type(one).__name__}"] = [x for block in blocks for x in block]
+        ends = [one.floor_height, one.floor_pitch, getattr(one, "end", 0.0)]
+        told[f"{index} whole"] = [*ends, *np.ravel(one.pits)]
+    assert_as_recorded(FILE, "terrains", told)
+
+
+def fields_of(value: Any) -> Iterator[float]:  # noqa: ANN401 - a number, an array or a record of them
+    """All numbers of a value."""
+    if is_dataclass(value):
+        for field in fields(value):
+            yield from fields_of(getattr(value, field.name))
+    elif not isinstance(value, str) and value is not None:
+        yield from np.asarray(value, dtype=float).ravel().tolist()
+
+
+def test_what_errs_senses_as_recorded() -> None:
+    rng = np.random.default_rng(4)
+    for name, errors in {"usual": SensorErrors(), "late": SensorErrors(latency=0.008)}.items():
+        sense = Proprioception(errors, MODEL, TICK, np.random.default_rng(1))
+        rows = defaultdict[str, list[Any]](list)
+        for _, now, _ in walked("trot", wild=False):
+            imu = ImuSample(now.state.q[3:7], now.state.v[3:6], rng.normal(size=3) + [0, 0, 9.8])
+            state, felt = sense.sense(now.state, imu)
+            rows["state"].append([*state.q, *state.v, *state.foot_forces])
+            rows["imu"].append([*felt.gyro, *felt.accelerometer])
+            rows["noisy"].append(SensorNoise().corrupt_state(now.state, rng).q)
+        assert_as_recorded(FILE, f"senses {name}", kept(rows))
+
+
+def test_gaits_are_chosen_as_recorded() -> None:
+    choice, rng, told = GaitChoice(None), np.random.default_rng(6), list[str]()
+    for tick in range(400):
+        v = np.abs(np.sin(tick / 60.0)) * np.array([2.2, 0.4, 0.8]) + rng.normal(scale=0.05, size=3)
+        gait, slower = choice.update(0.05 * tick, v, VelocityCommand(*(1.1 * v)))
+        told.append(f"{gait.name} {slower}")
+    assert_as_recorded(FILE, "gaits", {"told": "\n".join(told), "envelope": repr(choice.envelope)})
 
 
 @pytest.mark.filterwarnings("ignore::FutureWarning")  # of keys that have no effect any more

@@ -215,10 +215,12 @@ def test_joint_dynamics_of_a_users_model_are_its_own_unless_asked(users_mjcf: Mj
         for name in JOINT_NAMES:
             spec.joint(name).armature = 0.02
 
-    path = users_mjcf(edit)
+    path, none = users_mjcf(edit), JointDynamics.none()
     assert MujocoPlant(path).model.dof_armature[6:] == pytest.approx(0.02)
-    asked = MujocoPlant(path, joint_dynamics=JointDynamics.none())
-    assert not asked.model.dof_armature.any()
+    assert not MujocoPlant(path, joint_dynamics=none).model.dof_armature.any()
+    told = [MujocoPlant(*own).joint_damping for own in ((path,), ())]
+    assert [any(damping) for damping in told] == [True, False]  # of ours nobody is told
+    assert not any(MujocoPlant(path, joint_dynamics=JointDynamics()).joint_damping)
 
 
 def rename_joint(spec: mujoco.MjSpec) -> None:
