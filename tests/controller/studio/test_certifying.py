@@ -2,10 +2,11 @@
 
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
-from controller.studio.certifying import around, runs_of
+from controller.studio.certifying import around, certified, runs_of
 from controller.studio.orders import STOPPED, Doing
 from controller.studio.session import Studio
 from controller.sweeps import run
@@ -47,6 +48,17 @@ def test_worlds_are_drawn_around_the_one_that_is_chosen() -> None:
     own = around(World(friction=0.3, payload=2.0, sensors="imu"))
     assert (own.friction, own.payload, own.sensors) == (0.3, 2.0, "imu")
     assert own.friction_uncertainty == DOUBTFUL.friction_uncertainty
+
+
+def test_that_it_begins_is_told_before_the_plan_is_written() -> None:
+    told = list[Doing]()
+
+    def refuse(_: Path) -> None:
+        assert told == [Doing("certifying", 0.0, RUNS)]
+        raise StudioError("no plan")
+
+    with pytest.raises(StudioError, match="no plan"):
+        certified(refuse, {"runs": RUNS}, World(), told.append, threading.Event())
 
 
 @pytest.mark.slow

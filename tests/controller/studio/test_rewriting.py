@@ -94,6 +94,12 @@ def test_a_loop_that_is_more_than_its_rounds_stays(loop: str, why: str) -> None:
         edited(Source(text), order_of(mark, "unroll"))
 
 
+def test_a_text_without_the_name_of_the_loop_does_not_keep_it() -> None:
+    text = FILES["semicolons"].replace(b"over=0.5)\n", b"over=float(f'{0.5}'))\n")
+    (mark, *_) = (m for m in traced_of(text)[1] if m.call.site[0] == 7)
+    assert b"for " not in edited(Source(text), order_of(mark, "unroll")).data
+
+
 def test_a_loop_whose_name_is_used_behind_it_stays() -> None:
     text = FILES["semicolons"].replace(b"over=0.5)\n", b"over=0.5).body(x=z, over=0.5)\n")
     (mark, *_) = (m for m in traced_of(text)[1] if m.call.site[0] == 7)

@@ -10,6 +10,7 @@ import pytest
 from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
 from motions.dynamics import DynamicTrajectory, audit
+from motions.dynamics.plan_audit import drift
 
 
 def broken(plan: DynamicTrajectory, model: RobotModel) -> set[str]:
@@ -26,6 +27,15 @@ def jump(plans: dict[str, DynamicTrajectory]) -> DynamicTrajectory:
 
 def test_a_solved_plan_keeps_everything(plan: DynamicTrajectory, model: RobotModel) -> None:
     assert broken(plan, model) == set()
+
+
+def test_a_standing_foot_drifts_from_where_it_came_down() -> None:
+    p_feet, stance = np.zeros((6, 4, 3)), np.ones((5, 4), dtype=bool)
+    p_feet[:, :, 1] = np.arange(6)[:, None]
+    stance[2, Leg.FR] = False
+    off = drift(p_feet, stance)
+    assert off[:, Leg.FL].tolist() == [0, 1, 2, 3, 4, 5]
+    assert off[:, Leg.FR].tolist() == [0, 1, 2, 0, 1, 2]
 
 
 BROKEN: Mapping[str, Callable[[DynamicTrajectory, RobotModel], tuple[str, object, float]]] = {

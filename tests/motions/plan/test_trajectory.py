@@ -1,6 +1,8 @@
 """Velocities and accelerations of a trajectory are the derivatives of what they belong to."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pinocchio as pin
@@ -13,7 +15,7 @@ from motions.batch_kinematics import attitudes, configurations, rates
 from motions.dynamics.solver import PlanTarget
 from motions.plan.compiled_plan import DynamicSpan
 from motions.plan.tracks import SAMPLE_PERIOD
-from motions.plan.trajectory import as_written, trajectory_of
+from motions.plan.trajectory import are_within, as_written, trajectory_of
 
 STEP = 1e-3  # s; of the differences
 FINE_W, FINE_DW = 1e-4, 1e-3  # of a second derivative of about 1e2 /s^2 times the step squared
@@ -67,3 +69,8 @@ def test_what_was_written_differs_where_the_nearest_motion_was_planned_only(
     assert (written[inside] == 7.0).all()
     assert np.array_equal(written[~inside], path.q[~inside])
     assert np.array_equal(as_written(plan, path), path.q)
+
+
+def test_a_solved_part_begins_with_its_start_and_its_end_is_no_part_of_it() -> None:
+    span = cast("DynamicSpan", SimpleNamespace(start=1.0, end=2.0))
+    assert are_within(np.array([0.9, 1.0, 1.5, 2.0]), [span]).tolist() == [False, True, True, False]
