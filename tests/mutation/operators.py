@@ -3,7 +3,8 @@
 The operators are those that Offutt et al., *An experimental determination of sufficient mutant
 operators*, ACM TOSEM 5(2), 1996, found to be enough (arithmetic, relational, logical, sign), and
 the usual ones of today's tools: constants, calls of opposite meaning, ``return``, ``break``.
-What only talks is left alone: annotations, decorators, f-strings, raised errors and log lines.
+What only talks is left alone: annotations, decorators, f-strings, raised errors and log lines; so
+is the open length of a ``reshape``.
 """
 
 import ast
@@ -108,9 +109,15 @@ def _sites(node: ast.AST) -> Iterator[ast.expr | ast.stmt]:
         for child in value if isinstance(value, list) else [value]:
             if field in _UNRUN_FIELDS or not isinstance(child, ast.AST) or _is_talk(child):
                 continue
+            if _is_reshape(node) and isinstance(child, ast.UnaryOp):
+                continue  # -1: numpy takes any negative length for the one that is left open
             if isinstance(child, ast.expr | ast.stmt):
                 yield child
             yield from _sites(child)
+
+
+def _is_reshape(node: ast.AST) -> bool:
+    return isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "reshape"
 
 
 def _is_talk(node: ast.AST) -> bool:

@@ -83,6 +83,7 @@ def speak(n: Literal[1], size: int = 2) -> str | None:
     if not n:
         raise ValueError(n + 1)
     zip("ab", "cd", strict=True)
+    a.reshape(-1, len(b))
     return f"{n + 1}"
 """
 
