@@ -2,6 +2,8 @@
 
 import json
 import math
+import sys
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 
 from controller import sweep
 from controller.cli.common import ExitCode
+from controller.sweeps import trials
 from controller.sweeps.motion_study import MotionStudy, archive_of, replay
 from controller.sweeps.run import SweepResult
 from controller.sweeps.sweep_file import Row, SweepFile, row_of
@@ -120,6 +123,34 @@ def test_a_robot_that_does_not_get_up_is_a_row_that_says_why(dip: CompiledPlan) 
 )
 def test_words_stand_for_gaits_and_pushes(word: str, study: object) -> None:
     assert target_of(word).function == study
+
+
+@pytest.mark.parametrize("why", ["", "it fell"])
+def test_a_row_has_what_is_measured_or_why_nothing_is(
+    why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def measured(_: trials.TrialRobot) -> Row:
+        if why:
+            raise trials.TrialFailed(why)
+        return {"ok": True, "speed": 0.9}
+
+    monkeypatch.setattr(trials, "TrialRobot", nullcontext)
+    trial = Trial(5)
+    drawn: Row = {"friction": trial.friction, "mass_scale": trial.mass_scale}
+    found: Row = {"ok": not why, "fall": why, "speed": 0.1 if why else 0.9}
+    assert trials._row(trial, {"speed": 0.1}, measured) == {**drawn, **found}
+
+
+def test_what_lies_beside_a_swept_file_can_be_imported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "beside_swept.py").write_text("NUMBER = 3\n", encoding="utf-8")
+    file = tmp_path / "swept_file.py"
+    file.write_text("from beside_swept import NUMBER\n\ndef f(seed):\n    return {'n': NUMBER}\n")
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    for _ in range(2):
+        target_of(f"{file}:f")
+    assert sys.path.count(str(tmp_path)) == 1
 
 
 @pytest.mark.slow
