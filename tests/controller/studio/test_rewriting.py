@@ -95,9 +95,9 @@ def test_a_loop_that_is_more_than_its_rounds_stays(loop: str, why: str) -> None:
 
 
 def test_a_text_without_the_name_of_the_loop_does_not_keep_it() -> None:
-    text = FILES["semicolons"].replace(b"over=0.5)\n", b"over=float(f'{0.5}'))\n")
-    (mark, *_) = (m for m in traced_of(text)[1] if m.call.site[0] == 7)
-    assert b"for " not in edited(Source(text), order_of(mark, "unroll")).data
+    text = FILES["nested loops"].replace(b"over=0.4)", b"over=float(f'{0.4}'))")
+    (mark, *_) = (mark for mark in traced_of(text)[1] if mark.call.name == "foot")
+    assert b"height in" not in edited(Source(text), order_of(mark, "unroll"), "shown").data
 
 
 def test_a_loop_whose_name_is_used_behind_it_stays() -> None:
