@@ -1,6 +1,8 @@
 """What code once said, kept in files: a test fails where it says anything else.
 
-After a change that is meant, ``GO2_WBC_RECORD=1 python -m pytest -n 0 FILE`` records anew.
+After a change that is meant, ``GO2_WBC_RECORD=1 python -m pytest -n 0 FILE`` records anew. What the
+processor's own rounding decides, as which of two equal margins is the least, is kept as null, and
+not compared; found by recording under ``OPENBLAS_CORETYPE=Prescott``, ``Haswell`` and ``Zen``.
 """
 
 import json
@@ -29,12 +31,15 @@ def assert_as_recorded(file: Path, case: str, told: Mapping[str, object]) -> Non
     kept = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
     now = {name: digest(value) for name, value in told.items()}
     if os.environ.get("GO2_WBC_RECORD") == "1":
-        kept = dict(sorted({**kept, case: now}.items()))
+        open_ = {name: None for name, value in kept.get(case, {}).items() if value is None}
+        kept = dict(sorted({**kept, case: {**now, **open_}}.items()))
         lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(kept[name])}" for name in kept)
         file.write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
     assert now.keys() == kept[case].keys()
     for name, value in now.items():
         before = kept[case][name]
+        if before is None:
+            continue
         if isinstance(value, str) or isinstance(before, str):
             assert value == before, f"{case}, {name}: {told[name]}"
         else:
