@@ -125,6 +125,7 @@ class UnitreePlant(Plant):
         self._find()
         self._require_lying()
         self._release_sport(bus, interface)
+        self._find()  # a state of after that
         self._require_lying()
         self._take_over()
 
