@@ -13,7 +13,7 @@ from benchmarks.report import render, summarise, threshold_text
 from benchmarks.study import IDEAL, IMU, Results, Study, TrialResult, chosen_studies
 from controller.cli.common import ExitCode, ProgressLine, output, print_json, reader
 from controller.cli.sweep import tell
-from controller.sweeps.run import Progress, SweepResult, sweep
+from controller.sweeps.run import Progress, SweepResult, remove_sweep, sweep
 from controller.sweeps.sweep_file import SEED
 from controller.sweeps.targets import Target, code_digest
 from go2_wbc.errors import ConfigError, MissingDependency
@@ -164,6 +164,10 @@ class Benchmark:
         return output.publish(report.as_dict(), render(report))
 
 
+def _file_of(name: str, study: Study) -> Path:
+    return FOLDER / name / f"{study.name.replace(', ', '-').replace(' ', '_')}.sqlite"
+
+
 def measure_all(
     name: str, studies: Sequence[Study], seeds: int, *, jobs: int, resume: bool
 ) -> Results:
@@ -175,13 +179,15 @@ def measure_all(
     results: Results = {}
     total = seeds * sum(study.seed_factor for study in studies)
     about = {"benchmarks": code_digest(ROOT, ("benchmarks",))}
+    files = {study.name: _file_of(name, study) for study in studies}
+    for file in () if resume else files.values():
+        remove_sweep(file)  # what an interrupted run does not come to is not of it
     with ProgressLine() as line:
         for study in studies:
-            file = FOLDER / name / f"{study.name.replace(', ', '-').replace(' ', '_')}.sqlite"
             tell_of = partial(_tell, line, study, sum(map(len, results.values())), total)
             target, n = Target(study.name, study.row, about), seeds * study.seed_factor
             try:
-                found = _swept(target, n, file, jobs, tell_of, fresh=not resume)
+                found = _swept(target, n, files[study.name], jobs, tell_of)
             except ConfigError as error:
                 raise ConfigError(f"{error}; run without --resume to begin anew") from error
             trials = {int(row[SEED]): study.result_of(row) for row in found.rows}

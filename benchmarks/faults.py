@@ -125,7 +125,7 @@ def measure_break(trial: Trial, found: TrialResult, what: Break) -> None:
         if what.at_once and state == "three-legs":  # a dead sensor is right of a paw in the air
             broken.discard(what.named.format(PAW))
         values["named"] = max(times.get(part, math.inf) for part in broken) <= NAMED_WITHIN
-        values["others"] = len(told) - len(times)
+        values["others"] = len({(fault.part, fault.what) for fault in told}) - len(times)
         found.notes[state] = f"{', '.join(parts)} at {at:.2f} s: {health}; {reason}"
         found.values |= {f"{state}-{name}": float(value) for name, value in values.items()}
 
@@ -163,7 +163,8 @@ def measure_walk(trial: Trial, found: TrialResult, what: Break) -> None:
     """Trot, and call; what breaks at once breaks at random times, one part after the other."""
     rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
     with TrialRobot(plant_of(trial, FIRST_SEED, UNTOLD)) as robot:
-        go2, plant = robot.go2, robot.plant
+        go2, plant, told = robot.go2, robot.plant, set[PartFault]()
+        robot.truth.on_tick = lambda: told.update(go2.health.faults)
         for part in what.broken(trial.seed):
             at = float(rng.uniform(0.0, WALK_TIME))
             plant.fault(what.kind, part=part, at=at if what.at_once else 0.0, value=what.value)
@@ -184,7 +185,7 @@ def measure_walk(trial: Trial, found: TrialResult, what: Break) -> None:
         found.values["calls"] = done / len(CALLS)
         found.notes["health"] = str(go2.health)
         if not what.named:
-            found.values["others"] = float(len(go2.health.faults))
+            found.values["others"] = float(len(told))
 
 
 def measure_alarms(trial: Trial, found: TrialResult, world: Unknown | Robot) -> None:
@@ -207,7 +208,7 @@ def measure_alarms(trial: Trial, found: TrialResult, world: Unknown | Robot) -> 
                     make(robot, life, "recover", rng)
             robot.truth.clear()
     found.values = {"alarms": float(len(told)), "time": plant.time / 60.0}
-    found.notes["health"] = str(Health(tuple(told)))
+    found.notes["health"] = str(Health(tuple(sorted(told, key=lambda fault: fault.since))))
 
 
 _motor = partial(Break, kind="motor", named="motor of {}", is_of_paw=True)

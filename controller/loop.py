@@ -301,7 +301,7 @@ class ControlLoop:
     def _followed(self, solution: WbcSolution) -> JointCommand:
         self.latency.note(solution.tau_motors, solution.qdd)
         self._foretold = True
-        return self.latency.held(solution.command, solution.qdd, self.snapshot)
+        return self.latency.with_servo(solution.command, solution.qdd, self.snapshot)
 
     def _relaxed(self, solution: WbcSolution) -> JointCommand:
         """Follow a solution whose constraints gave way, unless they do gravely for too long."""

@@ -156,8 +156,8 @@ class Latency:
         """The torques [N m] that have just been asked for, and what they are to make."""
         note_command(self._lag, tau, qdd)
 
-    def held(self, command: JointCommand, qdd: Array18, ahead: Snapshot) -> JointCommand:
-        """A noted command, if late with the servo about what it is to make of ``ahead``."""
+    def with_servo(self, command: JointCommand, qdd: Array18, ahead: Snapshot) -> JointCommand:
+        """The command just noted; a late one with the servo about what it makes of ``ahead``."""
         if not READ < self._lag.ticks < self._lag.known:  # else nothing was predicted
             return command
         half, v = 0.5 * self._period, ahead.v[6:]

@@ -74,7 +74,8 @@ Others say the same while the load stays: they are judged once that changes."""
 CHANGED = 15.0  #: By so much [N]
 SOUND_TIME = 0.1
 """A sensor that was named is sound after all if it has changed with the load, within ``CHANGED``,
-for so long [s]: its foot was held in the air, say, and its leg pressed on what held it."""
+for so long [s]: its foot was held in the air, say, and its leg pressed on what held it. Once: one
+that comes and goes is broken."""
 RUBBING = 2.0
 """N m s/rad; joints damped so, as in MuJoCo Menagerie's Go2, may not be taken for loads."""
 CARRIED, UPRIGHT = 0.7, 0.9
@@ -102,7 +103,7 @@ class WatchedSensors(Record):
     load: Array4  #: of the leg, when that began [N]
     stood: Array4  #: for how long a foot has borne its leg's load [s]
     against: Array4  #: for how long a foot's force has contradicted the leg's torques [s]
-    agreed: Array4  #: for how long it has changed with them since it was named [s]
+    agreed: Array4  #: how long it has done so since it was named [s]; -inf once sound
     gyro: Array3  #: the last, as it was read
     accelerometer: Array3  #: the last, as it was read
     speed_noise: SpeedNoise  #: of the joints' speeds and the gyro
@@ -278,9 +279,9 @@ def watch_force(
         s.force_is_wrong[leg] = 1.0
     agrees = carries and force > SENSED and abs(force - borne) < CHANGED
     agrees = agrees and s.force_is_wrong[leg] > 0.0 and s.force_same[leg] < DOUBT
-    s.agreed[leg] = s.agreed[leg] + dt if agrees else 0.0
+    s.agreed[leg] = s.agreed[leg] + dt if agrees else min(s.agreed[leg], 0.0)
     if s.agreed[leg] > SOUND_TIME:
-        s.force_is_wrong[leg] = 0.0
+        s.force_is_wrong[leg], s.agreed[leg] = 0.0, -np.inf
     if s.force_is_wrong[leg] > 0.0:
         r.foot_forces[leg] = borne if borne > LOADED else 0.0
 

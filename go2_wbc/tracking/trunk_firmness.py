@@ -1,4 +1,4 @@
-"""Holds the trunk to its plan against the dry friction of the joints, on three feet or more.
+"""Holds the trunk to its plan against the dry friction of the joints.
 
 With the feet fixed, every motion of the trunk moves the joints of all stance legs, each with its
 friction. A task of the QP is an acceleration, so its stiffness is the moved inertia times the gain:
@@ -7,7 +7,7 @@ m about that axis, and so holds the trunk up to 4.6 deg off; 1.0 deg in pitch, 1
 the friction is fed forward (``robot.motor``), by the speed of the joints, which is zero while the
 trunk is stuck.
 
-So the gains on the trunk are higher than in a trot, and the friction is learned. Along each axis of
+So the gains on the trunk are higher than in a walk, and the friction is learned. Along each axis of
 the base, with the error e of position and attitude, and the planned speed v,
 
     a = .. + K e + D e',      c' = rate * s * e,      s = tanh(v / slow),      |c| <= limit

@@ -2,6 +2,7 @@
 
 import signal
 import typing
+import zlib
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
@@ -28,12 +29,13 @@ from tests.recorded import assert_as_recorded
 
 FILE = Path(__file__).with_name("recorded_kernels.json")
 DRAWS, KEPT = 24, 4  #: Calls of each function, and what is kept of them
-LENGTH = 7  #: Of an axis that may have any length
-LONG = (
+LENGTH = 40  #: Of an axis that may have any length
+LEFT_OUT = (
     *("planning.force_mpc.plan_forces", "planning.force_mpc.apply_force_plan"),
     *("planning.locomotion.plan", "planning.mpc.solve_mpc"),
+    *("planning.mpc.assemble", "planning.mpc.bound", "planning.trunk.gained"),
 )
-"""What takes seconds as plain Python, and is compared with it elsewhere."""
+"""What takes seconds as plain Python, or arguments that belong together: other tests hold it."""
 LONGEST = 5.0  #: Processor time [s] of a call: on such numbers a loop may be a long one
 
 
@@ -47,7 +49,7 @@ def routines() -> dict[str, Routine]:
             for value in vars(import_module(name)).values():
                 if isinstance(value, Routine) and value.written.__module__ == name:
                     found[value.name.removeprefix("go2_wbc.")] = value
-    return {name: found[name] for name in found if name not in LONG and is_drawn(found[name])}
+    return {name: found[name] for name in found if name not in LEFT_OUT and is_drawn(found[name])}
 
 
 def is_drawn(routine: Routine) -> bool:
@@ -160,6 +162,7 @@ ROUTINES = routines()
 @pytest.mark.parametrize("name", ROUTINES)
 def test_a_compiled_function_gives_as_plain_python_what_is_recorded(name: str) -> None:
     routine, told = ROUTINES[name], [list[float]() for _ in range(KEPT)]
+    failed = 0
     for draw in range(DRAWS):
         rng, sizes = np.random.default_rng(draw), dict[str, int]()
         given = [drawn(hint, rng, sizes) for hint in parameters(routine)]
@@ -170,9 +173,11 @@ def test_a_compiled_function_gives_as_plain_python_what_is_recorded(name: str) -
                 made = routine.written(*given)
             all_of_it = [*flat(made), *flat(tuple(given))]
         except (ArithmeticError, IndexError, ValueError, TimeoutError) as error:
-            all_of_it = [float(len(type(error).__name__))]
+            failed += 1
+            all_of_it = [float(zlib.crc32(type(error).__name__.encode())), *flat(tuple(given))]
         finally:
             signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
             signal.signal(signal.SIGVTALRM, before)
         told[draw % KEPT] += np.arcsinh(all_of_it).tolist()  # so that none outweighs all
+    assert failed < DRAWS / 2, "what is drawn for it is not what it takes"
     assert_as_recorded(FILE, name, {str(group): each for group, each in enumerate(told)})

@@ -112,7 +112,7 @@ def test_joints_of_late_commands_are_held_about_what_is_predicted(late: int) -> 
     followed(latency, jagged(rng, 500), late)
     ahead, qdd = MODEL.snapshot(state), 20.0 * rng.normal(size=18)
     command = JointCommand.torque(rng.normal(size=12))
-    held = latency.held(command, qdd, ahead)
+    held = latency.with_servo(command, qdd, ahead)
     if late <= READ:  # by that much readings may be old
         assert held is command
         return
@@ -123,4 +123,4 @@ def test_joints_of_late_commands_are_held_about_what_is_predicted(late: int) -> 
     np.testing.assert_allclose(held.asked(q, v + 0.1) - command.tau, -0.1 * KD)
     latency.forget()  # of a state that was not carried on nothing is predicted
     latency.note(command.tau, qdd)
-    assert latency.held(command, qdd, ahead) is command
+    assert latency.with_servo(command, qdd, ahead) is command
