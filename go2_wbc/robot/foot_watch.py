@@ -30,7 +30,7 @@ that was on a knee lay 0.12 too low, and its raised foot hung below its place, h
 a foot held the trunk is 0.01 too low at most."""
 
 EXCUSED = 1.0
-"""Time [s] after it was held, be it for three quarters of ``LASTS``, in which a foot's sensor may
+"""Time [s] after it was held, be it for half of ``LASTS``, in which a foot's sensor may
 contradict the leg: it is held for 0.3 s, and its sensor is found sound 0.1 s into the stance after
 that."""
 
@@ -62,7 +62,7 @@ class FootWatch:
         self._last = state.time
         self._time = np.where(is_held, self._time * goes_on + dt, 0.0)
         self._impulse = np.where(is_held, self._impulse * goes_on + held * dt, 0.0)
-        self._held_at[self._time > 0.75 * LASTS] = state.time
+        self._held_at[self._time > 0.5 * LASTS] = state.time
         for leg in np.flatnonzero((self._time > LASTS) & (self._impulse > IMPULSE)):
             if all(fault.part != FOOT_NAMES[leg] for fault in self.faults):
                 self.faults += (PartFault(FOOT_NAMES[leg], "was held", True, state.time),)

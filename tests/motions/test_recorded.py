@@ -30,11 +30,34 @@ from tests.recorded import assert_as_recorded
 FILE = Path(__file__).with_name("recorded.json")
 HARD = World(0.35, 0.2, 3.0, (0.05, -0.03, 0.1), 1.1, 0.1, 1.5, 0.3)
 LONGEST = 8.0  #: [s] of a motion of the library that is compared: checking takes its time
-DRAWN_FROM = (
-    "beckon bow cross_step curtsy figure_eight hula knock lift_leg look_around moonwalk nod "
-    "nose_circle point push_ups salute shake_head shake_paw sneeze sniff stamp stretch "
-    "tilt_head twist wave wiggle wiggle_hips"
-).split()
+DRAWN_FROM = [
+    "beckon",
+    "bow",
+    "cross_step",
+    "curtsy",
+    "figure_eight",
+    "hula",
+    "knock",
+    "lift_leg",
+    "look_around",
+    "moonwalk",
+    "nod",
+    "nose_circle",
+    "point",
+    "push_ups",
+    "salute",
+    "shake_head",
+    "shake_paw",
+    "sneeze",
+    "sniff",
+    "stamp",
+    "stretch",
+    "tilt_head",
+    "twist",
+    "wave",
+    "wiggle",
+    "wiggle_hips",
+]
 """Motions that are changed at random: what is drawn does not change when the library grows."""
 SUGGESTED = "together tilt_head"
 INSTANTS = 23  #: at which a plan is looked at

@@ -221,6 +221,17 @@ def test_a_sensor_agrees_with_its_leg_while_it_changes_with_its_load(
         assert s.agreed[leg] == (2.0 * DT if agrees else 0.0)
 
 
+def test_a_sensor_is_believed_again_once() -> None:
+    s, told = WatchedSensors(), list[float]()
+    for _ in range(2):
+        s.force_is_wrong[0] = 1.0
+        for tick in range(round(2.0 * SOUND_TIME / DT)):
+            r = reading(1, foot_forces=np.full(4, 40.0 + tick % 2))
+            watch_force(s, r, 0, 40.0, 0.0, True, DT)
+        told.append(float(s.force_is_wrong[0]))
+    assert told == [0.0, 1.0]
+
+
 def test_a_sensor_without_noise_may_say_the_same() -> None:
     still = np.full(4, 39.0)
     _, faults = watched(*(reading(k, foot_forces=still) for k in range(700)))
