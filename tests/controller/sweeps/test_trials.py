@@ -1,16 +1,21 @@
 """Trials draw what they say."""
 
+from __future__ import annotations
+
 import json
 import math
 import sys
 from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from controller import sweep
 from controller.cli.common import ExitCode
+from controller.modes import Mode
 from controller.sweeps import trials
 from controller.sweeps.motion_study import MotionStudy, archive_of, replay
 from controller.sweeps.run import SweepResult
@@ -27,7 +32,10 @@ from controller.sweeps.trials import (
     TrialRobot,
 )
 from go2_wbc import World
+from go2_wbc.config import Config
+from go2_wbc.contacts import GAITS
 from go2_wbc.errors import CommandError
+from go2_wbc.motion_plan import Posture
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline
@@ -151,6 +159,115 @@ def test_what_lies_beside_a_swept_file_can_be_imported(
     for _ in range(2):
         target_of(f"{file}:f")
     assert sys.path.count(str(tmp_path)) == 1
+
+
+class Recorded:
+    """Of a robot that goes ahead ever faster, as the time, and left at 0.1 m/s."""
+
+    def __init__(self, time: np.ndarray) -> None:
+        self.time = time
+        self.com_velocity = np.stack([time, np.full_like(time, 0.1), 0.0 * time], axis=1)
+        self.rpy = np.stack([0.0 * time, 0.0 * time, 0.3 * time], axis=1)
+
+    def since(self, time: float) -> Recorded:
+        return Recorded(self.time[self.time >= time - 1e-9])
+
+    def torque_shares(self, _: object) -> np.ndarray:
+        return np.array([0.2, 0.7, 0.4])
+
+
+class Untried(TrialRobot):
+    """On trial, with no robot: it notes what is asked of it."""
+
+    _motor = Config().motor
+
+    def __init__(
+        self, *, ok: bool = True, mode: Mode = Mode.WALKING, fall: str | None = None
+    ) -> None:
+        self.asked, self.now = list[object](), 10.0
+        self.go2: Any = SimpleNamespace(
+            sit=lambda: self._ask("sit", ok=ok),
+            stand=lambda: self._ask("stand", ok=ok),
+            walk=lambda gait: self._ask("walk", gait, ok=ok),
+            move=lambda *given, **more: self._ask(*given, *more.values()),
+            wait=self._wait,
+            mode=mode,
+            last_outcome=SimpleNamespace(reason="told"),
+        )
+        self.truth: Any = SimpleNamespace(
+            fall=lambda: fall, clear=lambda: self._ask("clear"), recording=self._recording
+        )
+        self.plant: Any = SimpleNamespace(
+            robot=Config().robot,
+            truth=lambda: SimpleNamespace(rpy=np.array([0.0, 0.0, math.pi / 6.0])),
+            push=lambda force, *more: self._ask(*np.round(force, 9), *more),
+        )
+
+    def _ask(self, *words: object, ok: bool = True) -> bool:
+        self.asked += words
+        return ok
+
+    def _wait(self, seconds: float) -> None:
+        """It goes 0.1 m left a second, all the time."""
+        self.now += seconds
+        self.plant.time = self.now
+        self.truth.p_world_com = 0.1 * self.now * np.array([0.0, 1.0, 5.0])
+
+    def _recording(self, since: float = 10.0) -> Recorded:
+        return Recorded(np.linspace(since, self.now, 131))
+
+
+@pytest.mark.parametrize(
+    ("mode", "fall", "why"),
+    [
+        (Mode.WALKING, None, ""),
+        (Mode.FALLEN, None, "told"),
+        (Mode.DAMPED, None, "told"),
+        (Mode.WALKING, "on its back", "on its back"),
+    ],
+)
+def test_a_robot_that_falls_while_time_passes_has_failed(
+    mode: Mode, fall: str | None, why: str
+) -> None:
+    robot = Untried(mode=mode, fall=fall)
+    with pytest.raises(trials.TrialFailed, match=f"^{why}$") if why else nullcontext():
+        robot.wait(2.0)
+    assert robot.now == 12.0
+
+
+@pytest.mark.parametrize("ok", [True, False])
+@pytest.mark.parametrize(("posture", "asked"), [(Posture.SIT, "sit"), (Posture.STAND, "stand")])
+def test_it_gets_ready_for_a_motion_or_has_failed(
+    posture: Posture, asked: str, *, ok: bool
+) -> None:
+    robot = Untried(ok=ok)
+    with nullcontext() if ok else pytest.raises(trials.TrialFailed, match="told"):
+        robot.get_ready(posture)
+    assert robot.asked == [asked]
+
+
+def test_a_gait_is_measured_once_it_follows_its_command() -> None:
+    robot = Untried()
+    found = GaitStudy("trot", VelocityCommand(0.5, 0.3, 0.2))._measured(robot)
+    assert robot.asked == ["walk", "trot", 0.5, 0.2, 0.3, "clear"]
+    ripple = np.linspace(11.5, 16.5, 101).std()
+    errors = {"speed_error": 13.5, "side_error": -0.2, "turn_error": 0.1}
+    assert found == pytest.approx({"ok": True, **errors, "speed_ripple": ripple, "torque": 0.7})
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.5])
+def test_a_push_comes_from_its_angle_at_its_time_of_the_stride(speed: float) -> None:
+    """The robot looks 30 degrees left, and goes 0.1 m/s to the left of the world."""
+    robot = Untried()
+    found = PushStudy(12.0, speed)._pushed(robot, math.pi / 3.0, 0.25)
+    begun = ["walk", "trot", speed, 0.0, 0.0, "clear"] if speed else ["stand"]
+    assert robot.asked == [*begun, 0.0, 120.0, 0.0, 0.1, "base"]
+    period = GAITS["trot"].period
+    assert robot.now == pytest.approx(13.5 + 0.25 * period)
+    ahead = speed * np.array([math.cos(math.pi / 6.0), 0.5])
+    distance = 2.0 * np.linalg.norm(np.array([0.0, 0.1]) - ahead)
+    expected = {"ok": True, "distance": distance, "speed_error": robot.now - period - speed}
+    assert found == pytest.approx(expected)
 
 
 @pytest.mark.slow
