@@ -1,10 +1,20 @@
 """A motion is done if it was near its plan, ended there, and held feet up on the average."""
 
-from dataclasses import dataclass
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from controller.acceptance import PAW_TOLERANCE, Acceptance, arrival, off_plan
+from controller.acceptance import (
+    PAW_TOLERANCE,
+    TOUCH_FORCE,
+    TOUCH_TIME,
+    Acceptance,
+    arrival,
+    off_plan,
+)
 from controller.modes import Aborted, are_within, told
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import HeldFoot, MotionPlan, Posture
@@ -73,6 +83,24 @@ def test_a_foot_that_was_too_low_is_told_with_what_was_measured() -> None:
         held.with_held_feet({})
     assert told.value.measured["mean paw height in first [m]"] == pytest.approx(0.3)
     assert told.value.measured["mean paw height in second [m]"] == pytest.approx(0.16)
+
+
+@pytest.mark.parametrize("lies", ["", "entry", "exit"])
+@pytest.mark.parametrize("force", [None, TOUCH_FORCE, 1.01 * TOUCH_FORCE])
+@pytest.mark.parametrize("ticks", [5, 6])
+def test_a_motion_may_touch_the_ground_for_a_moment_or_where_it_lies(
+    lies: str, force: float | None, ticks: int
+) -> None:
+    """Of a fifth of the time each."""
+    plant: Any = SimpleNamespace(body_contact_force=force, control_period=TOUCH_TIME / 5.0)
+    plan = replace(Holding(()), **dict.fromkeys([lies] if lies else [], Posture.LIE))
+    watched, snapshot = Acceptance(plan, plant), raised(Leg.FR, 0.0)
+    for _ in range(ticks):
+        watched.note(snapshot, 1.0)
+    played: Any = SimpleNamespace(deviation=Deviation(0.0, 0.0, 0.0))
+    touches = (force or 0.0) > TOUCH_FORCE and ticks > 5 and not lies
+    with pytest.raises(Aborted, match="touched the ground") if touches else nullcontext():
+        assert watched.judged(played, snapshot, {"at rest": 1.0})["at rest"] == 1.0
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,8 @@
 import json
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -50,6 +52,22 @@ def test_over_a_terrain_the_robot_walks_by_sight_and_its_recording_has_the_groun
     assert figure_of(report.steps[2], "up and down").measured == pytest.approx(0.12, abs=0.03)
     on_it = (np.abs(ground[:, 0] - 1.2) < 0.3) & (np.abs(ground[:, 1]) < 0.5)
     assert np.median(ground[on_it, 2]) == pytest.approx(0.12, abs=0.015)
+
+
+@pytest.mark.parametrize(("off", "is_met"), [(0.0, True), (0.09, True), (-0.11, False)])
+def test_a_way_over_a_terrain_is_asked_for_ahead_and_told_aside(
+    off: float, *, is_met: bool
+) -> None:
+    step = Stairs(0.12, count=1, way=BOTH, landing=0.8)
+    q = np.zeros((3, 19))
+    q[:, 6] = 1.0
+    q[1, 2], q[2, :2] = 0.12, (step.end + 0.6 + off, 0.3)
+    run: Any = SimpleNamespace(recording=SimpleNamespace(q=q))
+    ahead, aside, up = terrain_steps(step)[2].measure(run)
+    assert (ahead.asked, ahead.is_met) == (step.end + 0.6, is_met)
+    assert ahead.measured == pytest.approx(step.end + 0.6 + off)
+    assert (aside.measured, aside.asked, aside.is_met) == (0.3, 0.0, True)
+    assert (up.measured, up.asked) == (0.12, None)
 
 
 def test_the_walking_speed_is_measured_and_who_creeps_on_has_not_stopped(

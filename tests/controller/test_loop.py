@@ -1,6 +1,7 @@
 """The loop damps a robot whose QP, plant or posture fails, and says why."""
 
 import logging
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -120,6 +121,7 @@ def test_infeasible_qps_are_logged_and_the_residual_table_once_in_a_tumble(
     with caplog.at_level(logging.WARNING):
         run(loop, 6)
     assert caplog.text.count("QP failure at t=") == 3
+    assert caplog.text.count("found no solution of the whole-body QP") == 3
     for row in ("contact forces", "torque limits", "base dynamics"):
         assert caplog.text.count(row) == 1
 
@@ -145,7 +147,8 @@ def test_a_new_behaviour_has_the_whole_patience_again(
         run(loop, SAFETY.qp_patience - 1)
         assert loop.fault is None
         loop.tick()
-        assert loop.fault is not None
+        what = f"damped after {SAFETY.qp_patience} QP failures in a row: .* found no solution"
+        assert re.match(f"{what}[^\n]*$", fault_of(loop).reason)
     assert loop.telemetry.qp_failures == 3 * SAFETY.qp_patience
 
 

@@ -2,13 +2,19 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from controller.learning import expert
 from controller.learning.expert import Expert, stride_phase
 from controller.learning.tasks import TASKS, Shoves
 from controller.observation import OBSERVATION, RATE, TARGETS, Actuation
+from controller.sweeps.trials import TrialFailed
+from go2_wbc.motion_plan import Posture
+from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.recording import Recording
 
@@ -95,6 +101,48 @@ def test_a_stride_turns_once_from_touchdown_to_touchdown_and_stands_at_0() -> No
     assert apart[walks].max() < 0.01
     assert not phase[time > 2.6].any()
     assert not stride_phase(time, np.ones(len(time), dtype=bool), 0.5).any()
+
+
+@pytest.mark.parametrize("fall", [None, "on its back"])
+@pytest.mark.parametrize("archive", [b"", b"plan"])
+def test_what_is_commanded_is_told_from_none_on_and_whether_it_fell(
+    monkeypatch: pytest.MonkeyPatch, archive: bytes, fall: str | None
+) -> None:
+    """Of a walk of half a second, with a command each quarter, or of a motion, which has none."""
+    monkeypatch.setattr(expert, "plan_of", lambda _: SimpleNamespace(entry=Posture.SIT))
+    asked = list[object]()
+
+    def wait(seconds: float) -> None:
+        robot.plant.time += seconds
+        if fall:
+            raise TrialFailed(fall)
+
+    robot: Any = SimpleNamespace(
+        plant=SimpleNamespace(time=2.0),
+        go2=SimpleNamespace(
+            walk=lambda gait: asked.append(gait) or True,
+            play=lambda *_, **more: asked.append(more),
+            move=lambda x, turn, linear_y: asked.append((x, linear_y, turn)),
+            command=VelocityCommand(0.1, 0.2, 0.3),
+        ),
+        truth=SimpleNamespace(clear=lambda: asked.append("clear"), fall=lambda: fall),
+        require=lambda ok: None,
+        get_ready=asked.append,
+        wait=wait,
+    )
+    commands = replace(TASKS["velocity"].commands, every=0.25)
+    task = replace(TASKS["velocity"], commands=commands)
+    rng = np.random.default_rng(0)
+    told, phase, fell = Expert(task, archive=archive, duration=0.5)._done(robot, rng)
+    assert fell is (fall is not None)
+    assert told[0] == (-math.inf, 0.0, 0.0, 0.0)
+    times = [] if archive else [2.0] if fall else [2.0, 2.25]
+    assert told[1:] == [(time, 0.1, 0.2, 0.3) for time in times]
+    assert phase == pytest.approx(math.nan if archive else 0.5, nan_ok=True)
+    rng = np.random.default_rng(0)
+    drawn = [tuple(commands.draw(rng).tolist()) for _ in times]
+    played = [Posture.SIT, "clear", {"check": False, "allow_dynamic": True}]
+    assert asked == (played if archive else ["trot", "clear", *drawn])
 
 
 def test_rows_end_where_the_robot_falls() -> None:

@@ -102,6 +102,35 @@ def test_slots_tell_values_units_and_places() -> None:
     assert b"(10.0, -20.0)" in new
 
 
+def test_behind_a_starred_argument_no_place_is_known() -> None:
+    text = FILE.replace(b".hold(0.4)", b".foot(*SIDES, 0.3, over=0.4)")
+    source = Source(text)
+    slots = source.slots(source.syntax.site(text.index(b"0.4)") + 4))
+    assert [slot.of for slot in slots] == ["*", "over"]
+
+
+OWN = FILE.replace(
+    b"@motion",
+    b"""class Style:
+    over = 0.7
+    def __init__(self, over=0.6):
+        self.over = over
+        self.twice = 0.1
+        self.twice = 0.2
+
+STYLE = Style(0.4)
+
+@motion""",
+)
+
+
+@pytest.mark.parametrize(("field", "value"), [("over", 0.4), ("twice", None)])
+def test_a_field_has_the_value_that_init_gives_it_once(field: str, value: float | None) -> None:
+    text = OWN.replace(b".hold(0.4)", f".hold(STYLE.{field})".encode())
+    (slot,) = Source(text).slots(_site(text, "hold"))
+    assert slot.value == value
+
+
 def test_what_has_several_values_is_left_alone() -> None:
     text = FILE.replace(b"DEEP, HIGH", b"DEEP = 1.0\nDEEP, HIGH")
     site = _site(text, "body")
