@@ -2,7 +2,7 @@
 
 import math
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import Event
 from multiprocessing.connection import Connection
 from operator import attrgetter
@@ -14,13 +14,17 @@ import numpy as np
 import pytest
 
 import controller.go2_controller
+import controller.motion_files
 import controller.motion_measurement
 import controller.report_view
 import go2_wbc.plant
 import go2_wbc.plant.mujoco.ground_truth
-from controller.studio import jumping, working
+import motions
+from controller.studio import jumping, nearness, working, writing_out
 from controller.studio.grounds import PlayedGround
-from controller.studio.orders import AT_ONCE, STOPPED, Answer, Doing, Order, Task, TooLong
+from controller.studio.making import Maker
+from controller.studio.orders import AT_ONCE, STOPPED, Answer, Bar, Cut, Doing, Order, Task, TooLong
+from controller.studio.source import Source
 from controller.studio.working import Teller
 from go2_wbc.errors import StudioError
 from go2_wbc.legs import Leg
@@ -289,3 +293,147 @@ def test_the_first_limit_that_these_parts_break_is_told(
     content: Any = SimpleNamespace(verdict=SimpleNamespace(annotations=found))
     assert working._broken(content, start, end, parts) == told
     assert not working._broken(SimpleNamespace(verdict=None), start, end, parts)  # type: ignore[arg-type]
+
+
+FILE = b"""from motions import Timeline, motion
+
+FAST = True
+
+
+@motion
+def own() -> Timeline:
+    line = Timeline().body(z=0.0, over=1.0).hold(0.4)
+    for leg in ("FL", "FR"):
+        line = line.foot(leg, z=0.05 if FAST else 0.03, over=0.5).down(leg, over=0.5)
+    return line.home(over=0.5).pose("home", over=0.5)
+"""
+
+
+@pytest.mark.parametrize("is_here", [True, False])
+@pytest.mark.parametrize("task", [Task.CHECK, Task.DRAFT])
+@pytest.mark.parametrize("is_plan", [True, False])
+def test_a_bar_is_where_its_call_is_written(
+    tmp_path: Path, task: Task, *, is_here: bool, is_plan: bool
+) -> None:
+    own = replace(order(task), path=tmp_path / "own.py", data=FILE)
+    marks = Maker().make(own).marks
+    rests = SimpleNamespace(time=np.linspace(0.0, 7.0, 71), q=np.zeros((71, 19)))
+    moves = SimpleNamespace(time=rests.time, q=rests.q + rests.time[:, None])
+    plan, other = (rests, moves) if is_plan else (moves, rests)
+    content: Any = SimpleNamespace(verdict=None, is_plan=is_plan, recording=plan, ghost=other)
+    asked = own if is_here else replace(own, path=tmp_path / "other.py")
+    bars = list(working._bars(asked, Source(FILE), marks, content))
+    assert [(bar.name, bar.runs, bar.number) for bar in bars] == [
+        *(("body", 1, 0), ("hold", 1, 0), ("foot", 2, 0), ("down", 2, 0), ("foot", 2, 1)),
+        *(("down", 2, 1), ("home", 1, 0), ("pose", 1, 0)),
+    ]
+    assert [bar.is_idle for bar in bars] == [bar.name != "hold" for bar in bars]
+    assert bars[2].span == pytest.approx((1.4, 2.3, 2.8))
+    lines = [8, 8, 10, 10, 10, 10, 11, 11]
+    assert [bar.site[0] for bar in bars] == (lines if is_here else [0] * 8)
+    assert [bar.site[1] > 0 for bar in bars] == [is_here] * 8
+    assert [(bar.file, bar.line) for bar in bars] == [
+        ("", 0) if is_here else (str(own.path), line) for line in lines
+    ]
+    slots = [slot.plays for slot in bars[2].slots]
+    assert slots == ([None, True, False, None] if is_here and task is Task.CHECK else [])
+
+
+@dataclass(frozen=True)
+class Shown:
+    """As content."""
+
+    by: str
+    sliders: tuple[()] = ()
+
+
+BAR = Bar("hold", (1, 9), 1, 0, (0.0, 0.0, 0.4), (), "", (), {})
+BESIDE = {"content": ("prepared", "beside"), "told": "near", "text": (b"near", None)}
+
+
+@pytest.mark.parametrize(
+    ("task", "more", "is_coarse", "is_unsolved", "expected"),
+    [
+        (Task.MEND, {}, False, False, {"changes": ((".home()", "ends"),)}),
+        (Task.REWRITE, {"part": Cut((1, 2), 0, 0.5)}, False, False, {"text": (b"split", 9)}),
+        (Task.REWRITE, {"part": 3}, False, False, {"text": (b"out", None)}),
+        (Task.WRITE, {"out": Path("own.plan")}, False, False, {}),
+        (Task.CHECK, {}, False, False, {"content": ("prepared", "planned")}),
+        (Task.EXPORT, {}, False, False, {"content": Shown("planned")}),
+        (Task.CHECK, {}, False, True, {"content": ("prepared", "planned"), "is_solved": False}),
+        (Task.CHECK, {}, True, False, {"content": ("prepared", "coarse"), "is_solved": False}),
+        (Task.DRAFT, {}, True, False, {"content": ("prepared", "coarse")}),
+        (Task.DRAFT, {}, True, True, {"content": ("prepared", "coarse"), "is_solved": False}),
+        (Task.PLAY, {}, False, False, {"content": ("prepared", "played"), "told": "done"}),
+        (Task.NEAREST, {}, False, False, BESIDE),
+        (Task.BESIDE, {}, False, False, BESIDE),
+    ],
+)
+def test_each_task_has_its_answer(
+    monkeypatch: pytest.MonkeyPatch,
+    task: Task,
+    more: dict[str, Any],
+    expected: dict[str, Any],
+    *,
+    is_coarse: bool,
+    is_unsolved: bool,
+) -> None:
+    made: Any = SimpleNamespace(line="line", motion=SimpleNamespace(name="own", parameters=()))
+    made.values, made.marks, made.names, made.notes = {}, (), ("own", "two"), ("random",)
+    change = SimpleNamespace(call=".home()", meaning="ends")
+    written = list[object]()
+    cut = SimpleNamespace(data=b"split", site=(1, 2), offset=lambda site: sum(site) + 6)
+    for where, name, value in (
+        (working, "split", lambda *_: cut),
+        (working, "_played", lambda *_: (Shown("played"), "done")),
+        (working, "_other", lambda *_: (SimpleNamespace(data=b"near"), "line")),
+        (working, "_bars", lambda *_: [BAR]),
+        (working, "plainly", lambda content: content),
+        (working, "coarsely", lambda content, order: Shown("coarse")),
+        (working, "is_unsolved", lambda content: is_unsolved),
+        (working.worlds, "judged", lambda content, ground: content),
+        (motions, "suggest", lambda line, checker: [change]),
+        (writing_out, "written_out", lambda *_: SimpleNamespace(data=b"out")),
+        (nearness, "beside", lambda *_: (Shown("beside"), "near")),
+        (controller.motion_files, "write_motion", lambda *given: written.append(given[:2])),
+        (controller.report_view, "planned", lambda _: Shown("planned")),
+        (page_data, "prepared", lambda content: ("prepared", content.by)),
+    ):
+        monkeypatch.setattr(where, name, value)
+    checker = SimpleNamespace(evaluate=lambda line: line)
+    jumps: Any = SimpleNamespace(meet=written.append, checker=checker)
+    jumps.evaluate = lambda line, order: (line, is_coarse)
+    maker: Any = SimpleNamespace(make=lambda order: made)
+    pipe, asked = Pipe(), replace(order(task), **more)
+    teller = Teller(pipe, Event())
+    teller.begin(asked)
+    answer = working._answer(asked, jumps, maker, pipe, teller)
+    shown = {"bars": (BAR,), "motions": ("own", "two"), "notes": ("random",)}
+    assert answer == Answer("own", **(shown if "content" in expected else {}), **expected)
+    assert pipe.said == [*[Doing("playing")] * (task is Task.PLAY), "made"]
+    assert written == [World(), *[("line", asked.out)] * (task is Task.WRITE)]
+
+
+@pytest.mark.parametrize(
+    ("error", "answer"),
+    [
+        (StudioError("no"), StudioError("no")),
+        (SystemExit(3), StudioError("the file ends the program")),
+        (TooLong(), Answer("own", is_solved=False)),
+    ],
+)
+@pytest.mark.parametrize("has_run", [False, True])
+def test_what_fails_is_told_and_whether_the_file_has_run(
+    error: BaseException, answer: Answer | StudioError, *, has_run: bool
+) -> None:
+    def fail(*_: object) -> None:
+        raise error
+
+    made = SimpleNamespace(motion=None, values=None, line=None)
+    maker: Any = SimpleNamespace(make=(lambda _: made) if has_run else fail)
+    pipe, jumps = Pipe(), SimpleNamespace(meet=fail)
+    asked: Any = replace(order(Task.CHECK), chosen="own")
+    found = working._answer(asked, jumps, maker, pipe, Teller(pipe, Event()))  # type: ignore[arg-type]
+    assert (type(found), str(found)) == (type(answer), str(answer))
+    failed = ["failed"] * (not isinstance(error, TooLong))
+    assert pipe.said == (["made"] if has_run else failed)
