@@ -69,98 +69,6 @@ def test_a_trial_is_drawn_by_its_seed_inside_its_ranges() -> None:
     plant.close()
 
 
-SEEDS = 3
-SLOW_TROT = 0.05  #: Error of the mean velocity [m/s] that is no gross mistake
-
-
-@pytest.fixture(scope="module")
-def dip() -> CompiledPlan:
-    """A short motion."""
-    line = Timeline(name="dip").body(z=-0.03, over=0.4).home(over=0.4)
-    return compile_timeline(line, RobotModel())
-
-
-@pytest.fixture(scope="module")
-def dips(dip: CompiledPlan, tmp_path_factory: pytest.TempPathFactory) -> SweepResult:
-    """Its rows, by two workers."""
-    out = tmp_path_factory.mktemp("dips") / "dips.sqlite"
-    return sweep(dip, SEEDS, workers=2, out=out)
-
-
-def test_a_motion_is_done_in_every_world_that_is_drawn(dips: SweepResult) -> None:
-    assert [row["ok"] for row in dips.rows] == [True] * SEEDS
-    assert len({row["friction"] for row in dips.rows}) == SEEDS
-    assert all(0.0 < float(row["tracking"]) < 0.02 for row in dips.rows)
-
-
-def test_a_row_does_not_depend_on_the_rows_before_it(
-    dips: SweepResult, dip: CompiledPlan, tmp_path: Path
-) -> None:
-    """One worker for all seeds, in order; and one that has done none before."""
-    alone = sweep(dip, 1, first_seed=SEEDS - 1, workers=1, out=tmp_path / "alone.sqlite")
-    in_a_row = sweep(dip, SEEDS, workers=1, out=tmp_path / "row.sqlite")
-    assert in_a_row.rows == dips.rows
-    assert alone.rows == dips.rows[-1:]
-
-
-def test_a_plan_is_carried_number_by_number(dip: CompiledPlan) -> None:
-    study = target_of(dip).function
-    assert isinstance(study, MotionStudy)
-    assert study.archive == archive_of(dip)
-
-
-def test_a_robot_that_does_not_get_up_is_a_row_that_says_why(dip: CompiledPlan) -> None:
-    study = MotionStudy(archive_of(dip), World())
-    world, plant = study.drawn(0)
-    with TrialRobot(plant) as robot:
-        robot.go2.close()
-        row = row_of(study.row(world, robot))
-    assert (row["ok"], row["fall"]) == (False, "this GO2Controller is closed")
-    assert (row["done"], row["harm"]) == (False, "fell; not done")
-    assert math.isnan(float(row["slip"]))
-
-
-@pytest.mark.parametrize(
-    ("word", "study"),
-    [
-        ("gait:trot", GaitStudy("trot", VelocityCommand(0.5))),
-        ("gait:trot@0.3,-0.1,0.2", GaitStudy("trot", VelocityCommand(0.3, -0.1, 0.2))),
-        ("push:12", PushStudy(12.0, 0.5)),
-        ("push:8@0", PushStudy(8.0, 0.0)),
-    ],
-)
-def test_words_stand_for_gaits_and_pushes(word: str, study: object) -> None:
-    assert target_of(word).function == study
-
-
-@pytest.mark.parametrize("why", ["", "it fell"])
-def test_a_row_has_what_is_measured_or_why_nothing_is(
-    why: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def measured(_: trials.TrialRobot) -> Row:
-        if why:
-            raise trials.TrialFailed(why)
-        return {"ok": True, "speed": 0.9}
-
-    monkeypatch.setattr(trials, "TrialRobot", nullcontext)
-    trial = Trial(5)
-    drawn: Row = {"friction": trial.friction, "mass_scale": trial.mass_scale}
-    found: Row = {"ok": not why, "fall": why, "speed": 0.1 if why else 0.9}
-    assert trials._row(trial, {"speed": 0.1}, measured) == {**drawn, **found}
-
-
-def test_what_lies_beside_a_swept_file_can_be_imported(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "beside_swept.py").write_text("NUMBER = 3\n", encoding="utf-8")
-    file = tmp_path / "swept_file.py"
-    file.write_text("from beside_swept import NUMBER\n\ndef f(seed):\n    return {'n': NUMBER}\n")
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    for _ in range(2):
-        target_of(f"{file}:f")
-    assert sys.path.count(str(tmp_path)) == 1
-
-
 class Recorded:
     """Of a robot that goes ahead ever faster, as the time, and left at 0.1 m/s."""
 
@@ -268,6 +176,98 @@ def test_a_push_comes_from_its_angle_at_its_time_of_the_stride(speed: float) -> 
     distance = 2.0 * np.linalg.norm(np.array([0.0, 0.1]) - ahead)
     expected = {"ok": True, "distance": distance, "speed_error": robot.now - period - speed}
     assert found == pytest.approx(expected)
+
+
+SEEDS = 3
+SLOW_TROT = 0.05  #: Error of the mean velocity [m/s] that is no gross mistake
+
+
+@pytest.fixture(scope="module")
+def dip() -> CompiledPlan:
+    """A short motion."""
+    line = Timeline(name="dip").body(z=-0.03, over=0.4).home(over=0.4)
+    return compile_timeline(line, RobotModel())
+
+
+@pytest.fixture(scope="module")
+def dips(dip: CompiledPlan, tmp_path_factory: pytest.TempPathFactory) -> SweepResult:
+    """Its rows, by two workers."""
+    out = tmp_path_factory.mktemp("dips") / "dips.sqlite"
+    return sweep(dip, SEEDS, workers=2, out=out)
+
+
+def test_a_motion_is_done_in_every_world_that_is_drawn(dips: SweepResult) -> None:
+    assert [row["ok"] for row in dips.rows] == [True] * SEEDS
+    assert len({row["friction"] for row in dips.rows}) == SEEDS
+    assert all(0.0 < float(row["tracking"]) < 0.02 for row in dips.rows)
+
+
+def test_a_row_does_not_depend_on_the_rows_before_it(
+    dips: SweepResult, dip: CompiledPlan, tmp_path: Path
+) -> None:
+    """One worker for all seeds, in order; and one that has done none before."""
+    alone = sweep(dip, 1, first_seed=SEEDS - 1, workers=1, out=tmp_path / "alone.sqlite")
+    in_a_row = sweep(dip, SEEDS, workers=1, out=tmp_path / "row.sqlite")
+    assert in_a_row.rows == dips.rows
+    assert alone.rows == dips.rows[-1:]
+
+
+def test_a_plan_is_carried_number_by_number(dip: CompiledPlan) -> None:
+    study = target_of(dip).function
+    assert isinstance(study, MotionStudy)
+    assert study.archive == archive_of(dip)
+
+
+def test_a_robot_that_does_not_get_up_is_a_row_that_says_why(dip: CompiledPlan) -> None:
+    study = MotionStudy(archive_of(dip), World())
+    world, plant = study.drawn(0)
+    with TrialRobot(plant) as robot:
+        robot.go2.close()
+        row = row_of(study.row(world, robot))
+    assert (row["ok"], row["fall"]) == (False, "this GO2Controller is closed")
+    assert (row["done"], row["harm"]) == (False, "fell; not done")
+    assert math.isnan(float(row["slip"]))
+
+
+@pytest.mark.parametrize(
+    ("word", "study"),
+    [
+        ("gait:trot", GaitStudy("trot", VelocityCommand(0.5))),
+        ("gait:trot@0.3,-0.1,0.2", GaitStudy("trot", VelocityCommand(0.3, -0.1, 0.2))),
+        ("push:12", PushStudy(12.0, 0.5)),
+        ("push:8@0", PushStudy(8.0, 0.0)),
+    ],
+)
+def test_words_stand_for_gaits_and_pushes(word: str, study: object) -> None:
+    assert target_of(word).function == study
+
+
+@pytest.mark.parametrize("why", ["", "it fell"])
+def test_a_row_has_what_is_measured_or_why_nothing_is(
+    why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def measured(_: trials.TrialRobot) -> Row:
+        if why:
+            raise trials.TrialFailed(why)
+        return {"ok": True, "speed": 0.9}
+
+    monkeypatch.setattr(trials, "TrialRobot", nullcontext)
+    trial = Trial(5)
+    drawn: Row = {"friction": trial.friction, "mass_scale": trial.mass_scale}
+    found: Row = {"ok": not why, "fall": why, "speed": 0.1 if why else 0.9}
+    assert trials._row(trial, {"speed": 0.1}, measured) == {**drawn, **found}
+
+
+def test_what_lies_beside_a_swept_file_can_be_imported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "beside_swept.py").write_text("NUMBER = 3\n", encoding="utf-8")
+    file = tmp_path / "swept_file.py"
+    file.write_text("from beside_swept import NUMBER\n\ndef f(seed):\n    return {'n': NUMBER}\n")
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    for _ in range(2):
+        target_of(f"{file}:f")
+    assert sys.path.count(str(tmp_path)) == 1
 
 
 @pytest.mark.slow
