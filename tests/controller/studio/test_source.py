@@ -131,6 +131,15 @@ def test_a_field_has_the_value_that_init_gives_it_once(field: str, value: float 
     assert slot.value == value
 
 
+@pytest.mark.parametrize("loop", ["yaw in YAWS.values()", "_, yaw in YAWS.items()"])
+def test_a_loop_over_a_dictionary_has_its_values(loop: str) -> None:
+    text = FILE.replace(b"SIDES =", b"YAWS = {'left': 10.0, 'right': -10.0}\nSIDES =")
+    text = text.replace(b"yaw in (10.0, -10.0)", loop.encode())
+    sites = [_site(text, "body", k + 1) for k in (0, 1)]
+    slots = [Source(text).slots(site, Run(k))[0] for k, site in enumerate(sites)]
+    assert [slot.value for slot in slots] == [10.0, -10.0]
+
+
 def test_what_has_several_values_is_left_alone() -> None:
     text = FILE.replace(b"DEEP, HIGH", b"DEEP = 1.0\nDEEP, HIGH")
     site = _site(text, "body")
