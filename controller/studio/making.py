@@ -28,6 +28,7 @@ WHOLE = (
 )
 LONG = 10.0  #: Time [s] from which on that is told
 PACKAGES = frozenset({"site-packages", "dist-packages"})  #: Folders of what others have written
+OURS = ("go2_wbc", "controller", "motions", "viz")  #: Packages that lie beside files of a checkout
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,9 +105,11 @@ class Maker:
         A module that is from elsewhere stays so.
         """
         found, others, start = dict[str, int](), self._others[folder], f"{folder}{os.sep}"
+        ours = tuple(f"{start}{package}{os.sep}" for package in OURS)
         for name in sys.modules.keys() - others:
             file = getattr(sys.modules[name], "__file__", None) or ""
-            if file.startswith(start) and not PACKAGES & {*(path := Path(file)).parts}:
+            is_own = file.startswith(start) and not file.startswith(ours)
+            if is_own and not PACKAGES & {*(path := Path(file)).parts}:
                 found[name] = path.stat().st_mtime_ns if path.exists() else 0
             else:
                 others.add(name)

@@ -1,6 +1,7 @@
 """What the process that runs an author's file tells, and how it plays: without a process."""
 
 import math
+import sys
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from multiprocessing import Event
@@ -22,7 +23,7 @@ import go2_wbc.plant.mujoco.ground_truth
 import motions
 from controller.studio import jumping, nearness, working, writing_out
 from controller.studio.grounds import PlayedGround
-from controller.studio.making import Maker
+from controller.studio.making import OURS, Maker
 from controller.studio.orders import AT_ONCE, STOPPED, Answer, Bar, Cut, Doing, Order, Task, TooLong
 from controller.studio.source import Source
 from controller.studio.working import Teller
@@ -437,3 +438,15 @@ def test_what_fails_is_told_and_whether_the_file_has_run(
     assert (type(found), str(found)) == (type(answer), str(answer))
     failed = ["failed"] * (not isinstance(error, TooLong))
     assert pipe.said == (["made"] if has_run else failed)
+
+
+def test_a_motion_beside_the_library_leaves_the_library_as_it_is() -> None:
+    beside = Path(motions.__file__).parent.parent / "own.py"
+    maker, known = Maker(), dict(sys.modules)
+    try:
+        for _ in range(2):
+            maker.make(replace(order(Task.CHECK), path=beside, data=FILE))
+        new = {name for name, module in known.items() if sys.modules.get(name) is not module}
+    finally:
+        sys.modules.update(known)
+    assert not {name for name in new if name.partition(".")[0] in OURS}
