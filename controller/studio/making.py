@@ -51,7 +51,7 @@ class Maker:
     def __init__(self) -> None:
         self._is_random = dict[tuple[Path, str], bool]()
         self._read = dict[str, int]()
-        self._others = defaultdict[Path, set[str]](set)
+        self._others = defaultdict[Path, set[str]](set(sys.modules).copy)
 
     def make(self, order: Order) -> Made:
         """Run the text.

@@ -4,6 +4,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -15,6 +16,7 @@ from controller.acceptance import (
     arrival,
     off_plan,
 )
+from controller.behaviours.plans import PlayPlan
 from controller.modes import Aborted, are_within, told
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import HeldFoot, MotionPlan, Posture
@@ -97,7 +99,7 @@ def test_a_motion_may_touch_the_ground_for_a_moment_or_where_it_lies(
     watched, snapshot = Acceptance(plan, plant), raised(Leg.FR, 0.0)
     for _ in range(ticks):
         watched.note(snapshot, 1.0)
-    played: Any = SimpleNamespace(deviation=Deviation(0.0, 0.0, 0.0))
+    played = Mock(spec=PlayPlan, deviation=Deviation(0.0, 0.0, 0.0))
     touches = (force or 0.0) > TOUCH_FORCE and ticks > 5 and not lies
     with pytest.raises(Aborted, match="touched the ground") if touches else nullcontext():
         assert watched.judged(played, snapshot, {"at rest": 1.0})["at rest"] == 1.0

@@ -3,18 +3,18 @@
 import json
 import math
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from controller import GO2Controller
 from controller.demo import DEMO_STEPS, DemoProgress, Measurement, StepResult, run_demo
-from controller.demo.steps import terrain_steps, three_leg_minima
+from controller.demo.steps import StepRun, terrain_steps, three_leg_minima
 from go2_wbc.errors import IkError, PlantTimeout
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.terrain import BOTH, Stairs
+from go2_wbc.recording import Recording
 from tests.controller.fake_go2 import FakeGo2
 from tests.script_server import python
 
@@ -62,7 +62,7 @@ def test_a_way_over_a_terrain_is_asked_for_ahead_and_told_aside(
     q = np.zeros((3, 19))
     q[:, 6] = 1.0
     q[1, 2], q[2, :2] = 0.12, (step.end + 0.6 + off, 0.3)
-    run: Any = SimpleNamespace(recording=SimpleNamespace(q=q))
+    run = Mock(spec=StepRun, recording=Mock(spec=Recording, q=q))
     ahead, aside, up = terrain_steps(step)[2].measure(run)
     assert (ahead.asked, ahead.is_met) == (step.end + 0.6, is_met)
     assert ahead.measured == pytest.approx(step.end + 0.6 + off)

@@ -3,7 +3,7 @@
 import math
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from controller.learning import expert
 from controller.learning.expert import Expert, stride_phase
 from controller.learning.tasks import TASKS, Shoves
 from controller.observation import OBSERVATION, RATE, TARGETS, Actuation
-from controller.sweeps.trials import TrialFailed
+from controller.sweeps.trials import TrialFailed, TrialRobot
 from go2_wbc.motion_plan import Posture
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
@@ -117,7 +117,8 @@ def test_what_is_commanded_is_told_from_none_on_and_whether_it_fell(
         if fall:
             raise TrialFailed(fall)
 
-    robot: Any = SimpleNamespace(
+    robot = Mock(
+        spec=TrialRobot,
         plant=SimpleNamespace(time=2.0),
         go2=SimpleNamespace(
             walk=lambda gait: asked.append(gait) or True,

@@ -222,14 +222,12 @@ def test_a_sensor_agrees_with_its_leg_while_it_changes_with_its_load(
 
 
 def test_a_sensor_is_believed_again_once() -> None:
-    s, told = WatchedSensors(), list[float]()
-    for _ in range(2):
+    s = WatchedSensors()
+    for is_wrong in (0.0, 1.0):
         s.force_is_wrong[0] = 1.0
-        for tick in range(round(2.0 * SOUND_TIME / DT)):
-            r = reading(1, foot_forces=np.full(4, 40.0 + tick % 2))
-            watch_force(s, r, 0, 40.0, 0.0, True, DT)
-        told.append(float(s.force_is_wrong[0]))
-    assert told == [0.0, 1.0]
+        for force in (40.0, 41.0) * round(SOUND_TIME / DT):
+            watch_force(s, reading(1, foot_forces=np.full(4, force)), 0, 40.0, 0.0, True, DT)
+        assert s.force_is_wrong[0] == is_wrong
 
 
 def test_a_sensor_without_noise_may_say_the_same() -> None:
@@ -490,10 +488,7 @@ def named_after(landing: float, seen_after: float = 0.0) -> float:
 def test_a_jump_of_the_gyro_as_a_foot_lands_has_to_be_shown_for_longer(
     landing: float, lasts: float
 ) -> None:
-    """Of 13 gyros that jumped within 12 ms of a landing none was named: it was taken for a jerk.
-
-    A landing on the edge of a step is one: 2 of 20 sound gyros were named on stairs of 13 cm.
-    """
+    """Of 13 that jumped within 12 ms of one none was named; of 20 sound ones on stairs 2 were."""
     assert named_after(landing) == pytest.approx(lasts, abs=2.1 * DT)
 
 

@@ -1,8 +1,7 @@
 """Velocities and accelerations of a trajectory are the derivatives of what they belong to."""
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import cast
+from unittest.mock import Mock
 
 import numpy as np
 import pinocchio as pin
@@ -72,5 +71,5 @@ def test_what_was_written_differs_where_the_nearest_motion_was_planned_only(
 
 
 def test_a_solved_part_begins_with_its_start_and_its_end_is_no_part_of_it() -> None:
-    span = cast("DynamicSpan", SimpleNamespace(start=1.0, end=2.0))
+    span = Mock(spec=DynamicSpan, start=1.0, end=2.0)
     assert are_within(np.array([0.9, 1.0, 1.5, 2.0]), [span]).tolist() == [False, True, True, False]
