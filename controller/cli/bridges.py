@@ -6,6 +6,7 @@ import logging
 import signal
 import sys
 import threading
+import time
 from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
@@ -103,7 +104,8 @@ def unitree_sim(
     )
     with closing(UnitreeSimulator(settings)) as simulator:
         print(f"serving on DDS domain {domain}, interface {interface}", flush=True)
-        while not stop.wait(0.5):
+        while not stop.is_set():
+            time.sleep(0.1)
             if not simulator.is_alive:
                 raise PlantError("the simulation has ended; what was said before tells why")
         gate = simulator.gate
@@ -175,7 +177,11 @@ def _tell(step: Step, *, as_json: bool) -> None:
 
 
 def _until_signal() -> threading.Event:
-    """Is set by Ctrl-C, and by what ends a service."""
+    """Is set by Ctrl-C, and by what ends a service.
+
+    Ask ``is_set()``; the main thread may not ``wait()``: that holds the event's lock for a moment,
+    and a handler that breaks in then waits for the lock in ``set()``, for ever.
+    """
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
