@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.adversary import FIRST, outcome
 from benchmarks.adversary_motions import COUNT, FAMILIES, Numbers
-from benchmarks.command import Jobs, Output, RowsFile, positive, run_sweep
+from benchmarks.command import FOLDER, Jobs, Output, RowsFile, positive, run_sweep
 from benchmarks.probability_fit import Bins, calibration
 from benchmarks.robots import checker
 from benchmarks.validation_set.physics import bisected
@@ -43,7 +43,7 @@ def run(
     *,
     motions: Annotated[int, "N", "default %(default)s", positive] = MOTIONS,
     first: Annotated[int, "SEED", "default %(default)s"] = FIRST,
-    rows: RowsFile = None,
+    rows: RowsFile = FOLDER / "border.sqlite",
     jobs: Jobs = 2,
     output: Output,
 ) -> int:
@@ -57,7 +57,7 @@ def run(
     python -m benchmarks border --motions 12
     python -m benchmarks border --first 0   seeds to mend the check by
     """
-    result = run_sweep("border", asked, motions, rows=rows, jobs=jobs, first_seed=first)
+    result = run_sweep(asked, motions, rows, jobs, first)
     shares, bins = measured(result.rows)
     is_ok = are_met(shares) and not result.failures
     values = {"passed": is_ok, "shares": shares, "bins": bins, "lost": result.failures}

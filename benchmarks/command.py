@@ -3,7 +3,7 @@
 import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import partial, wraps
 from itertools import groupby
 from pathlib import Path
@@ -14,8 +14,8 @@ from benchmarks.study import IDEAL, IMU, Results, Study, TrialResult, chosen_stu
 from controller.cli.common import ExitCode, ProgressLine, output, print_json, reader
 from controller.cli.sweep import tell
 from controller.sweeps.run import Progress, SweepResult, remove_sweep, sweep
-from controller.sweeps.sweep_file import SEED
-from controller.sweeps.targets import Target, code_digest
+from controller.sweeps.sweep_file import SEED, Row
+from controller.sweeps.targets import Target, code_digest, digest
 from go2_wbc.errors import ConfigError, MissingDependency
 from go2_wbc.files import write_atomically
 
@@ -30,7 +30,7 @@ Sensors = Annotated[
 Jobs = Annotated[int, "N", "processes, default %(default)s", positive]
 Listed = Annotated[bool, "list the metrics, run nothing"]
 Resume = Annotated[bool, "skip what an interrupted run has finished"]
-RowsFile = Annotated[Path | None, "FILE", f"keep rows here, default in {FOLDER}"]
+RowsFile = Annotated[Path, "FILE", "keep rows here, default %(default)s"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,90 +164,84 @@ class Benchmark:
         return output.publish(report.as_dict(), render(report))
 
 
-def _file_of(name: str, study: Study) -> Path:
-    return FOLDER / name / f"{study.name.replace(', ', '-').replace(' ', '_')}.sqlite"
-
-
 def measure_all(
     name: str, studies: Sequence[Study], seeds: int, *, jobs: int, resume: bool
 ) -> Results:
-    """Sweep the studies, one after the other; of every trial is told, and its row kept at once.
+    """Sweep the trials of all studies at once; of every one is told, and its row kept at once.
 
     The number of seeds is multiplied by a study's factor. A process that dies costs no other trial
     its result. To be called from the main thread.
     """
-    results: Results = {}
-    total = seeds * sum(study.seed_factor for study in studies)
-    about = {"benchmarks": code_digest(ROOT, ("benchmarks",))}
-    files = {study.name: _file_of(name, study) for study in studies}
-    for file in () if resume else files.values():
+    turn = [(study, k) for study in studies for k in range(study.seed_factor)]
+    trials = [
+        (study, study.seed_factor * number + k) for number in range(seeds) for study, k in turn
+    ]  # in this order more seeds only add to what is there
+    results: Results = {study.name: {} for study in studies}
+    names = ", ".join(results)
+    file = FOLDER / name / f"{digest(names.encode())}.sqlite"
+    if not resume:
         remove_sweep(file)  # what an interrupted run does not come to is not of it
-    with ProgressLine() as line:
-        for study in studies:
-            tell_of = partial(_tell, line, study, sum(map(len, results.values())), total)
-            target, n = Target(study.name, study.row, about), seeds * study.seed_factor
-            try:
-                found = _swept(target, n, files[study.name], jobs, tell_of)
-            except ConfigError as error:
-                raise ConfigError(f"{error}; run without --resume to begin anew") from error
-            trials = {int(row[SEED]): study.result_of(row) for row in found.rows}
-            lost = {seed: TrialResult(reason=why) for seed, why in found.failures.items()}
-            results[study.name] = dict(sorted((trials | lost).items()))
+    about = {"benchmarks": code_digest(ROOT, ("benchmarks",)), "studies": names}
+    target = Target(name, partial(_row_of, trials), about)
+    try:
+        found = run_sweep(target, len(trials), file, jobs, told=partial(_tell, trials))
+    except ConfigError as error:
+        raise ConfigError(f"{error}; run without --resume to begin anew") from error
+    given = {int(row[SEED]): _trial_in(row) for row in found.rows}
+    given |= {number: TrialResult(reason=why) for number, why in found.failures.items()}
+    for number, (study, seed) in enumerate(trials):
+        results[study.name][seed] = given[number]
     return results
 
 
-def _tell(line: ProgressLine, study: Study, before: int, total: int, progress: Progress) -> None:
+def _row_of(trials: Sequence[tuple[Study, int]], number: int) -> Row:
+    study, seed = trials[number]
+    return {"study": study.name, "trial": seed, "result": json.dumps(asdict(study.run(seed)))}
+
+
+def _trial_in(row: Row) -> TrialResult:
+    return TrialResult(**json.loads(str(row["result"])))
+
+
+def _tell(trials: Sequence[tuple[Study, int]], line: ProgressLine, progress: Progress) -> None:
     """How far all has come, and what came of a trial; a bug ends it."""
-    done, failure = before + progress.done, progress.failure
+    failure = progress.failure
     if progress.seed is None:
-        line.update(done / total, f"{study.name}, starting")
+        line.update(progress.share, "starting")
         if progress.done:
-            print(f"{progress.done} finished trials of {study.name} are kept", file=sys.stderr)
+            print(f"{progress.done} finished trials are kept", file=sys.stderr)
         return
     if failure is not None and not failure.has_died:
         raise RuntimeError(f"{failure.text}\n{failure.details}")
-    result = study.result_of(progress.row) if progress.row else TrialResult()
+    result = _trial_in(progress.row) if progress.row else TrialResult()
     failures = [f"{metric}: {why}" for metric, why in result.failures.items()]
     told = failure.text if failure else result.reason or "; ".join(failures) or "ok"
-    place = f"{done}/{total} {study.name}, seed {progress.seed}"
+    study, seed = trials[progress.seed]
+    place = f"{progress.done}/{progress.total} {study.name}, seed {seed}"
     line.done(f"{place}: {told}")
-    line.update(done / total, place)
+    line.update(progress.share, place)
 
 
 def run_sweep(
-    name: str,
-    trial: Callable[[int], object],
-    n: int,
-    *,
-    rows: Path | None,
-    jobs: int,
-    first_seed: int = 0,
-) -> SweepResult:
-    """Run those of ``n`` seeds whose rows are not kept yet, as ``sweep``; tell of the progress.
-
-    The rows are kept in ``rows``, or in a file with the ``name`` of the benchmark.
-
-    Raises:
-        ConfigError: if the folder of the rows cannot be made, or they depend on something else.
-    """
-    with ProgressLine() as line:
-        rows = rows or FOLDER / f"{name}.sqlite"
-        return _swept(trial, n, rows, jobs, partial(tell, line), first_seed=first_seed)
-
-
-def _swept(
     what: object,
     n: int,
     rows: Path,
     jobs: int,
-    on_progress: Callable[[Progress], None],
-    **more: Any,  # noqa: ANN401
+    first_seed: int = 0,
+    told: Callable[[ProgressLine, Progress], None] = tell,
 ) -> SweepResult:
+    """Run those of ``n`` seeds that ``rows`` does not keep yet, as ``sweep``; tell of the progress.
+
+    Raises:
+        ConfigError: if the folder of the rows cannot be made, or they depend on something else.
+    """
     try:
         rows.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ConfigError(f"cannot make the folder of {rows}: {error.strerror}") from error
-    return sweep(what, n, workers=jobs, out=rows, keep_going=True, on_progress=on_progress, **more)
+    with ProgressLine() as line:
+        how = {"first_seed": first_seed, "workers": jobs, "on_progress": partial(told, line)}
+        return sweep(what, n, out=rows, keep_going=True, **how)
 
 
 def _print_list(studies: Sequence[Study]) -> None:

@@ -17,7 +17,7 @@ from typing import Annotated
 
 import numpy as np
 
-from benchmarks.command import Jobs, Output, RowsFile, run_sweep
+from benchmarks.command import FOLDER, Jobs, Output, RowsFile, run_sweep
 from benchmarks.robots import UNTOLD, plant_of
 from controller.motion_measurement import FULL
 from controller.sweeps.sweep_file import Row
@@ -46,7 +46,7 @@ CONFIG = Config(envelope=VelocityEnvelope(forward=1e3, backward=1e3, lateral=1e3
 def run(
     *,
     store: Annotated[bool, "store them in the package"] = False,
-    rows: RowsFile = None,
+    rows: RowsFile = FOLDER / "envelopes.sqlite",
     jobs: Jobs = 1,
     output: Output,
 ) -> int:
@@ -58,7 +58,7 @@ def run(
     python -m benchmarks envelopes           measure and print; ten minutes
     python -m benchmarks envelopes --store   also store them in the package
     """
-    result = run_sweep("envelopes", trial, len(ITEMS), rows=rows, jobs=jobs)
+    result = run_sweep(trial, len(ITEMS), rows, jobs)
     bounds = collected(result.rows)
     is_whole = not result.failures and all(len(b) == len(MOST) for b in bounds.values())
     if store and is_whole:

@@ -17,7 +17,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks.command import Jobs, Output, RowsFile, positive, run_sweep
+from benchmarks.command import FOLDER, Jobs, Output, RowsFile, positive, run_sweep
 from benchmarks.probability_fit import Calibration, Sample, calibration, fit_model
 from benchmarks.probability_runs import DRAWN, exam, motion_and_world, seeds, trial
 from benchmarks.validation_set.drawing import TEST, TRAIN
@@ -46,7 +46,7 @@ def run(
         Path | None, "FILE", "write a .csv with a line for every run", output(".csv")
     ] = None,
     plot: Annotated[Path | None, "FILE", "draw the reliability: .svg, ...", plot_file] = None,
-    rows: RowsFile = None,
+    rows: RowsFile = FOLDER / "probability.sqlite",
     jobs: Jobs = 2,
     output: Output,
 ) -> int:
@@ -67,7 +67,7 @@ def run(
     if motions is not None and motions < least:
         told = f"none of the first {motions} is of the test half, which judges"
         raise CommandError(f"--motions must be {least} or more: {told}")
-    result = run_sweep("probability", trial, seeds(motions), rows=rows, jobs=jobs)
+    result = run_sweep(trial, seeds(motions), rows, jobs)
     found, model = result.rows, fitted()
     if fit:
         model = fit_model(_samples(_of_halves(found, *FITTED)))

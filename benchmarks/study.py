@@ -6,14 +6,11 @@ number only informs: ``"mm"``, or ``">= mm"`` where more is better. Names begin 
 
 from __future__ import annotations
 
-import json
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TypeVar
 
-from controller.sweeps.sweep_file import Row
 from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
 
@@ -22,7 +19,7 @@ IDEAL, IMU = "ideal", "imu"
 SENSED = "sensed-"  # What names on the robot's own sensors begin with
 BAR = re.compile(r"(<=|>=)? ?(-?\d[-\d.e]*(?= |$))? ?(.*)")  # Side, threshold and unit
 Rows = Sequence[tuple[str, str, str]]  #: Name, quantity and bar
-_WORDS = ("failures", "notes")  # Of a trial, by row
+_Told = TypeVar("_Told", float, str)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +68,11 @@ class TrialResult:
     def named(self, prefix: str) -> TrialResult:
         """The same with names that begin with ``prefix``."""
 
-        def named(found: dict[str, Any]) -> dict[str, Any]:
+        def named(found: Mapping[str, _Told]) -> dict[str, _Told]:
             return {joined(prefix, name): value for name, value in found.items()}
 
-        values, failures = named(self.values), named(self.failures)
-        return TrialResult(values, failures, self.reason, named(self.notes))
+        values = {name: float(value) for name, value in named(self.values).items()}
+        return TrialResult(values, named(self.failures), self.reason, named(self.notes))
 
 
 def joined(prefix: str, name: str) -> str:
@@ -141,20 +138,6 @@ class Study:
                 found.values.setdefault(self.done, 0.0)
                 found.failures[self.done] = found.reason
         return found.named(self._prefix)
-
-    def row(self, seed: int) -> Row:
-        """The trial of a seed as the row of a sweep; nan is no value."""
-        found = self.run(seed)
-        values = {m.name: float(found.values.get(m.name, math.nan)) for m in self.metrics}
-        words = {name: json.dumps(getattr(found, name)) for name in _WORDS}
-        return {**values, "reason": found.reason, **words}
-
-    def result_of(self, row: Row) -> TrialResult:
-        """The trial that a row keeps."""
-        values = {m.name: float(row[m.name]) for m in self.metrics}
-        words = {name: json.loads(str(row[name])) for name in _WORDS}
-        known = {name: value for name, value in values.items() if not math.isnan(value)}
-        return TrialResult(known, reason=str(row["reason"]), **words)
 
 
 Results = dict[str, dict[int, TrialResult]]  #: What every trial gave, by study and seed

@@ -1,5 +1,6 @@
 """Every trial is run once, in whatever process, and one that dies costs no other its result."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -63,6 +64,18 @@ def test_every_seed_is_run_once_in_processes_as_one_after_the_other(results_fold
         "more": [0, 1, 2, 3],
     }
     assert results["fake"] == results_of(fake(), seeds=2)["fake"]
+
+
+def test_studies_share_the_processes_seed_by_seed(
+    results_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    more = Study("more", TABLE, measure_badly, seed_factor=2)
+    measure_all("any", [fake(), more], 2, jobs=1, resume=False)
+    told = re.findall(r"(\d/\d) (\w+), seed (\d): ok", capsys.readouterr().err)
+    assert [f"{name} {seed}" for _, name, seed in told] == [
+        *("fake 0", "more 0", "more 1", "fake 1", "more 2", "more 3"),
+    ]
+    assert told[-1][0] == "6/6"
 
 
 def test_a_process_that_dies_fails_its_own_trial_only(
