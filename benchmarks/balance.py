@@ -142,11 +142,6 @@ def measure_recovery(trial: Trial, found: TrialResult) -> None:
             found.notes[""] = robot.go2.last_outcome.reason
 
 
-def measure_gaits(trial: Trial, found: TrialResult) -> None:
-    """Change the gait, or stop, again and again."""
-    _follow(trial, found, changing, CHANGES)
-
-
 def changing(robot: TrialRobot, rng: np.random.Generator, count: int) -> Iterator[float]:
     """A stop, or another gait at a velocity in its envelope; then some time."""
     for _ in range(count):
@@ -161,13 +156,8 @@ def changing(robot: TrialRobot, rng: np.random.Generator, count: int) -> Iterato
         yield float(rng.uniform(0.3, 1.5))
 
 
-def measure_commands(trial: Trial, found: TrialResult) -> None:
-    """Follow random velocities; ticks in which the QP had no answer are counted."""
-    found.values["failures"] = _follow(trial, found, commanded, COMMANDS)
-
-
-def _follow(trial: Trial, found: TrialResult, course: Course, count: int) -> float:
-    """Note the share of a course's ``count`` parts that are done; gives how often the QP failed."""
+def measure_course(trial: Trial, found: TrialResult, course: Course, count: int) -> None:
+    """The share of a course's ``count`` parts that are done, and how often the QP had no answer."""
     rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
     with TrialRobot(plant_of(trial, FIRST_SEED, UNTOLD)) as robot:
         robot.require(robot.go2.walk())
@@ -178,8 +168,7 @@ def _follow(trial: Trial, found: TrialResult, course: Course, count: int) -> flo
                 done += 1
         except TrialFailed as failed:
             found.notes[""] = str(failed)
-        found.values[""] = done / count
-        return float(robot.go2.telemetry.qp_failures)
+        found.values |= {"": done / count, "failures": robot.go2.telemetry.qp_failures}
 
 
 _STANDING = f"standing, push 0.1 s, {ASIDE:g} N s aside, {AHEAD:g} ahead"
@@ -203,7 +192,11 @@ ON_TRUTH = (
         for push, (_, impulse) in TROT_PUSHES.items()
     ),
     Study("recover", {"drops": [("", "stand again", ">= 0.98")]}, measure_recovery, seed_factor=10),
-    Study("gaits", {"ten changes of gait and stops": [("", "done", _ALL)]}, measure_gaits),
+    Study(
+        "gaits",
+        {"ten changes of gait and stops": [("", "done", _ALL)]},
+        partial(measure_course, course=changing, count=CHANGES),
+    ),
     Study(
         "commands",
         {
@@ -212,7 +205,7 @@ ON_TRUTH = (
                 ("failures", "ticks without an answer", "<= 0"),
             )
         },
-        measure_commands,
+        partial(measure_course, course=commanded, count=COMMANDS),
     ),
     disturbed.STUDY,
 )

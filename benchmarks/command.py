@@ -233,12 +233,8 @@ def run_sweep(
     """Run those of ``n`` seeds that ``rows`` does not keep yet, as ``sweep``; tell of the progress.
 
     Raises:
-        ConfigError: if the folder of the rows cannot be made, or they depend on something else.
+        ConfigError: if the file of the rows cannot be used, or they depend on something else.
     """
-    try:
-        rows.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"cannot make the folder of {rows}: {error.strerror}") from error
     with ProgressLine() as line:
         how = {"first_seed": first_seed, "workers": jobs, "on_progress": partial(told, line)}
         return sweep(what, n, out=rows, keep_going=True, **how)

@@ -8,7 +8,6 @@ only, and of the test half no single motion is shown.
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import cache, partial
 from typing import Annotated
 
@@ -19,12 +18,11 @@ from benchmarks.validation_set import questions as exam
 from benchmarks.validation_set.drawing import TEST
 from benchmarks.validation_set.physics import (
     BORDER,
-    BORDERS,
     BORDERS_FILE,
     LENIENT,
     STOPS,
     STRICT,
-    MotionFailures,
+    borders_of,
     borders_version,
     play,
     read_borders,
@@ -34,7 +32,6 @@ from benchmarks.validation_set.physics import (
 from benchmarks.validation_set.questions import Question, draw_name, draws
 from benchmarks.validation_set.scores import HALVES, Case, render, scores, wrong_ones
 from controller.motion_measurement import FELL
-from controller.sweeps.targets import digest
 from controller.sweeps.trials import Trial
 
 EXAM, DYNAMIC, REFUSED = "exam", "dynamic", "refused"
@@ -106,7 +103,7 @@ def ask(trial: Trial, found: TrialResult, of: str, half: str | None) -> None:
     report = checker().check(plan)
     outcome = verdicts_of(play(plan, model, question.draw, trial.sensors), plan)
     refusal = tuple(dict.fromkeys(finding.check for finding in report.failures))
-    reasons = {REFUSED: refusal, **{kind: outcome.by(kind) for kind in OUTCOMES}}
+    reasons = {REFUSED: refusal, **outcome}
     found.values = {row: float(bool(reason)) for row, reason in reasons.items()}
     found.values[REFUSED] = float(not report.ok)
     found.notes = {row: _BETWEEN.join(reason) for row, reason in reasons.items()}
@@ -133,7 +130,7 @@ def case_of(question: Question, one: TrialResult) -> Case:
 
     family = question.family
     refusal = reasons(REFUSED) or (("refused",) if one.values[REFUSED] else ())
-    outcome = MotionFailures(*map(reasons, OUTCOMES))
+    outcome = {kind: reasons(kind) for kind in OUTCOMES}
     return Case(question.name, family.half, question.stratum, family.is_dynamic, refusal, outcome)
 
 
@@ -153,16 +150,6 @@ def judged(cases: Sequence[Case], asked: int, rows: str = EXAM) -> tuple[bool, s
     return is_ok, said + ("ok." if is_ok else "NO.")
 
 
-def _numbered(
-    trial: Trial,
-    found: TrialResult,
-    measure: Callable[[Trial, TrialResult], None],
-    numbers: Sequence[int],
-) -> None:
-    """Measure the trial whose seed has this place among ``numbers``."""
-    measure(replace(trial, seed=numbers[trial.seed]), found)
-
-
 def _bisect(
     measure: Callable[[Sequence[Study], int], Results],
     motions: int | None,
@@ -174,11 +161,7 @@ def _bisect(
     kept = {} if remake or not BORDERS_FILE.exists() else read_borders()
     names = [draw_name(*draw) for draw in draws()]
     wanted = [seed for seed, name in enumerate(names) if name not in kept][:motions]
-    study = replace(
-        BORDERS,
-        name=f"{BORDERS.name} {digest(repr(wanted).encode())}",
-        measure=partial(_numbered, measure=BORDERS.measure, numbers=wanted),
-    )
+    study = borders_of(wanted)
     found = measure([study], len(wanted))[study.name] if wanted else {}
     for number, one in found.items():
         if one.values:

@@ -23,6 +23,7 @@ from benchmarks.command import positive
 from benchmarks.golden_runs import KEPT_EVERY, RUNS, STAGES, Ledger, Values
 from controller.cli.common import ExitCode, ProgressLine
 from go2_wbc.errors import CommandError, ConfigError, unknown_name
+from go2_wbc.files import checked_output
 
 RECORD, COMPARE = "record", "compare"
 
@@ -152,10 +153,7 @@ def run(
         if name not in RUNS:
             raise CommandError(unknown_name("run", name, RUNS))
     if act == RECORD:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise ConfigError(f"cannot make {folder}: {error.strerror}") from error
+        checked_output(folder / "run.pickle", (".pickle",))
     work = partial(work_on, act=act, folder=folder, tolerance=tolerance)
     is_equal, good = True, "recorded" if act == RECORD else "equal"
     with ProgressLine() as line:

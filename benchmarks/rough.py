@@ -96,7 +96,7 @@ class Way:
 
     name: str  #: of the scenario
     item: str  #: what it is, for the report
-    terrain: Callable[[int], Terrain]  #: by the seed
+    terrain: Terrain | Callable[[int], Terrain]  #: the same for all seeds, or by the seed
     speed: float = 0.5  #: commanded, ahead [m/s]; negative walks backwards
     length: float | None = None  #: where it has to come [m]; None for behind the terrain's end
     heading: float = 0.0  #: at the start [rad]
@@ -122,9 +122,13 @@ class Way:
             self.name, {self.item: rows}, measure, done="done", group=group, sensors=sensors
         )
 
+    def ground(self, seed: int) -> Terrain:
+        """The terrain of a trial."""
+        return self.terrain(seed) if callable(self.terrain) else self.terrain
+
     def plant(self, seed: int, sensors: str) -> MujocoPlant:
         """The simulated robot of a trial."""
-        rng, terrain = np.random.default_rng(seed), self.terrain(seed)
+        rng, terrain = np.random.default_rng(seed), self.ground(seed)
         friction, mass, yaw = (float(rng.uniform(*bounds)) for bounds in (FRICTION, MASS, YAW))
         drawn = {"friction": friction, "mass_scale": mass, "initial_yaw": self.heading + yaw}
         own = IMU if self.sees else sensors
@@ -140,7 +144,7 @@ class Way:
 def measure_way(trial: Trial, found: TrialResult, way: Way, first_seed: int = FIRST_SEED) -> None:
     """Walk the way; see the module's docstring for what is measured."""
     seed = first_seed + trial.seed
-    behind = (way.terrain(seed).end + BEYOND) / abs(math.cos(way.heading))
+    behind = (way.ground(seed).end + BEYOND) / abs(math.cos(way.heading))
     length = way.length or behind
     with TrialRobot(way.plant(seed, trial.sensors)) as robot:
         robot.require(robot.go2.walk())
@@ -167,7 +171,6 @@ def _walked(robot: TrialRobot, speed: float, length: float) -> float:
     start, course = plant.truth(), plant.read().yaw
     way, most, side = 0.0, PATIENCE + length / (LEAST_SHARE * abs(speed)), math.copysign(1.0, speed)
     ahead = side * np.array([math.cos(start.yaw), math.sin(start.yaw)])
-    way = 0.0
     while (elapsed := plant.time - start.time) <= most:
         go2.move(speed, STEER * wrap_angle(course - plant.read().yaw))
         go2.wait(LOOK)
@@ -241,16 +244,8 @@ def measure_reversals(
             found.values["off"] = float(np.mean(off))
 
 
-def _at(terrain: Terrain) -> Callable[[int], Terrain]:
-    return partial(_same, terrain)
-
-
-def _same(terrain: Terrain, _: int) -> Terrain:
-    return terrain
-
-
-def _stairs(height: float) -> Callable[[int], Terrain]:
-    return _at(Stairs(height, 6, 0.31, way=BOTH, landing=1.6))
+def _stairs(height: float) -> Terrain:
+    return Stairs(height, 6, 0.31, way=BOTH, landing=1.6)
 
 
 def _boxes(seed: int) -> Terrain:
@@ -258,7 +253,7 @@ def _boxes(seed: int) -> Terrain:
 
 
 SLOPE, ASLANT = math.radians(22.0), math.radians(20.0)
-_SLOPE, _DOWN = _at(Ramp(SLOPE, length=2.0)), _at(Stairs(0.13, 6, 0.31, way=DOWN))
+_SLOPE, _DOWN = Ramp(SLOPE, length=2.0), Stairs(0.13, 6, 0.31, way=DOWN)
 WAYS = (
     Way("stairs-10", "6 stairs up and down, 10 cm, 0.5 m/s", _stairs(0.10)),
     Way("stairs-13", "13 cm", _stairs(0.13)),
@@ -268,37 +263,37 @@ WAYS = (
     Way("stairs-down", "6 stairs down, 13 cm, 0.5 m/s", _DOWN, length=3.5),
     Way("stairs-aslant", "13 cm, aslant by 20 deg", _stairs(0.13), heading=ASLANT),
     Way("slow-stairs-aslant", "the same, 0.3 m/s", _stairs(0.13), 0.3, heading=ASLANT),
-    Way("blocks", "4 blocks of 14 cm, 0.5 m/s", _at(Blocks(0.14)), bar=0.9),
+    Way("blocks", "4 blocks of 14 cm, 0.5 m/s", Blocks(0.14), bar=0.9),
     Way("slope", "ramp of 22 deg up and down, 0.5 m/s", _SLOPE),
     Way("slope-back", "the same backwards", _SLOPE, -0.5, heading=math.pi),
-    Way("waves", "5 waves of 8 cm, 0.5 m/s", _at(Waves(0.08))),
+    Way("waves", "5 waves of 8 cm, 0.5 m/s", Waves(0.08)),
     Way("boxes", "boxes up to 12 cm, 0.5 m/s", _boxes, length=3.5),
     Way("course", "random course of 12 m, 0.5 m/s", Course.drawn, bar=None),
 )
-_UP = _at(Stairs(0.16, 6, 0.31))
+_UP = Stairs(0.16, 6, 0.31)
 SEEING = (
     Way("seen-stairs-13", "6 stairs up and down, 13 cm, 0.3 m/s", _stairs(0.13), 0.3),
     Way("seen-stairs-16", "16 cm", _stairs(0.16), 0.3, bar=1.0),
     Way("seen-stairs-18", "18 cm", _stairs(0.18), 0.3),
     Way("seen-stairs-20", "20 cm", _stairs(0.20), 0.3, bar=0.8),
-    Way("seen-stairs-down", "18 cm down only", _at(Stairs(0.18, 6, 0.31, way=DOWN)), 0.3, 3.5),
+    Way("seen-stairs-down", "18 cm down only", Stairs(0.18, 6, 0.31, way=DOWN), 0.3, 3.5),
     Way("seen-stairs-aslant", "16 cm, aslant by 20 deg", _stairs(0.16), 0.3, None, ASLANT, 0.9),
     Way("seen-stairs-turn", "16 cm up, half a turn, down", _UP, 0.3, 3.4, returns=True, bar=0.9),
     Way("depth-stairs-16", "16 cm by depth camera", _stairs(0.16), 0.3, sees="depth", bar=0.9),
-    Way("seen-blocks", "4 blocks of 20 cm, 0.5 m/s", _at(Blocks(0.20))),
+    Way("seen-blocks", "4 blocks of 20 cm, 0.5 m/s", Blocks(0.20)),
     Way("seen-slope", "ramp of 22 deg up and down, 0.5 m/s", _SLOPE),
-    Way("seen-gap-20", "gap of 20 cm, 0.5 m/s", _at(Gap(0.20))),
-    Way("seen-gap-30", "30 cm", _at(Gap(0.30)), bar=0.6),
-    Way("seen-stones", "stones of 25 cm, 10 cm between, 0.3 m/s", _at(Stones()), 0.3, bar=0.8),
-    Way("seen-waves", "5 waves of 8 cm, 0.5 m/s", _at(Waves(0.08)), bar=1.0),
+    Way("seen-gap-20", "gap of 20 cm, 0.5 m/s", Gap(0.20)),
+    Way("seen-gap-30", "30 cm", Gap(0.30), bar=0.6),
+    Way("seen-stones", "stones of 25 cm, 10 cm between, 0.3 m/s", Stones(), 0.3, bar=0.8),
+    Way("seen-waves", "5 waves of 8 cm, 0.5 m/s", Waves(0.08), bar=1.0),
     Way("seen-boxes", "boxes up to 12 cm, 0.5 m/s", _boxes, length=3.5, bar=1.0),
     Way("seen-course", "random course of 12 m, 0.5 m/s", Course.drawn, bar=0.9),
 )
 SEEING = tuple(replace(way, sees=way.sees or "lidar") for way in SEEING)
 BARRIERS = (
-    Way("seen-wall", "wall", _at(Blocks(0.6, count=1, start=2.0))),
-    Way("seen-gap-60", "gap of 60 cm", _at(Gap(0.6, start=2.0))),
-    Way("seen-step-30", "step of 30 cm", _at(Stairs(0.3, count=1, start=2.0))),
+    Way("seen-wall", "wall", Blocks(0.6, count=1, start=2.0)),
+    Way("seen-gap-60", "gap of 60 cm", Gap(0.6, start=2.0)),
+    Way("seen-step-30", "step of 30 cm", Stairs(0.3, count=1, start=2.0)),
 )
 BARRIERS = tuple(replace(way, sees="lidar") for way in BARRIERS)
 _ROWS = (("done", "share done", ">= 1"), ("off", "velocity off", "<= 0.25 m/s"))

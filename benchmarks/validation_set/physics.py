@@ -3,11 +3,10 @@
 And at which amplitude it changes its mind: bisected by playing, and kept in a file.
 """
 
-import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from benchmarks.study import Study, TrialResult
@@ -22,6 +21,7 @@ from controller.motion_measurement import (
     measure_motion,
     short_legs,
 )
+from controller.sweeps.targets import digest
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import write_atomically
@@ -36,53 +36,34 @@ STEP, STEP_SOLVED = 1.6, 1.25  # Ratio of amplitudes in the search for two that 
 BORDER, PLAYS = "border", "plays"
 BORDERS_FILE = Path(__file__).parent / "borders.json"
 STRICT, STOPS, LENIENT = "strict", "stops", "lenient"
+"""Definitions of what has gone wrong, besides ``FELL``. Strict is what an author sees: not done, or
+not as it was written. Stops is the same, or a joint was pressed against its stop: MuJoCo's hold a
+joint within 0.02 rad of its limit, so a motion that asks for more often looks done. Lenient are
+distances from the plan, with more room, whatever ``play`` says."""
 LENIENT_OFF = 0.05  #: Distance [m] that anything may be off what was written, leniently
+Failures = Mapping[str, tuple[str, ...]]
+"""What went wrong, in words, by each definition; nothing did where it is empty."""
 
 
-@dataclass(frozen=True, slots=True)
-class MotionFailures:
-    """What went wrong, in words, by each definition; nothing did where it is empty."""
-
-    strict: tuple[str, ...]  #: what an author sees: not done, or not as it was written
-    stops: tuple[str, ...]
-    """The same, or a joint was pressed against its stop: MuJoCo's hold a joint within 0.02 rad of
-    its limit, so a motion that asks for more often looks done."""
-    lenient: tuple[str, ...]  #: distances from the plan, with more room, whatever ``play`` says
-    fell: tuple[str, ...]  #: nothing else
-
-    def by(self, definition: str) -> tuple[str, ...]:
-        """What went wrong by ``STRICT``, ``STOPS``, ``LENIENT`` or ``FELL``."""
-        found: tuple[str, ...] = getattr(self, definition)
-        return found
-
-
-def verdicts_of(run: MotionMeasurement, plan: MotionPlan) -> MotionFailures:
+def verdicts_of(run: MotionMeasurement, plan: MotionPlan) -> Failures:
     """Judge what was measured by all definitions."""
     strict = failures_of(run, plan)
-    fell = _true({FELL: run.fall is not None})
+    fell = (FELL,) if run.fall is not None else ()
     if UNPLANNED in strict:
-        return MotionFailures(strict, strict, strict, fell)
-    pressed = _true({f"on a stop {1e3 * run.stopped:.0f} ms": run.stopped > MOMENT})
-    return MotionFailures(strict, (*strict, *pressed), _leniently(run, plan), fell)
-
-
-def _leniently(run: MotionMeasurement, plan: MotionPlan) -> tuple[str, ...]:
+        return {STRICT: strict, STOPS: strict, LENIENT: strict, FELL: fell}
+    pressed = (f"on a stop {1e3 * run.stopped:.0f} ms",) if run.stopped > MOMENT else ()
     off = max(run.tracking, run.ends_off, run.feet_off, short_legs(plan) - run.feet_off)
-    return _true(
-        {
-            FELL: run.fall is not None,
-            f"slip {1e3 * run.slip:.0f} mm": run.slip > SLIP,
-            f"{1e3 * off:.0f} mm off": off > LENIENT_OFF,
-            f"touch {1e3 * run.touched:.0f} ms": run.touched > MOMENT,
-            f"saturated {1e3 * run.saturated:.0f} ms": run.saturated > MOMENT,
-            f"joint {-run.joint_distance:.3f} rad past": run.joint_distance < 0.0,
-            f"joint at {100.0 * run.speed:.0f} % speed": run.speed > 1.0,
-        }
-    )
-
-
-def _true(found: dict[str, bool]) -> tuple[str, ...]:
-    return tuple(what for what, is_so in found.items() if is_so)
+    leniently = {
+        FELL: bool(fell),
+        f"slip {1e3 * run.slip:.0f} mm": run.slip > SLIP,
+        f"{1e3 * off:.0f} mm off": off > LENIENT_OFF,
+        f"touch {1e3 * run.touched:.0f} ms": run.touched > MOMENT,
+        f"saturated {1e3 * run.saturated:.0f} ms": run.saturated > MOMENT,
+        f"joint {-run.joint_distance:.3f} rad past": run.joint_distance < 0.0,
+        f"joint at {100.0 * run.speed:.0f} % speed": run.speed > 1.0,
+    }
+    lenient = tuple(what for what, is_so in leniently.items() if is_so)
+    return {STRICT: strict, STOPS: (*strict, *pressed), LENIENT: lenient, FELL: fell}
 
 
 def play(
@@ -105,9 +86,9 @@ def is_done(question: Question) -> bool:
     return not failures_of(play(plan, model, question.draw), plan)
 
 
-def measure_border(trial: Trial, found: TrialResult) -> None:
-    """The border of draw number ``trial.seed``, or why there is none."""
-    family, number = draws()[trial.seed]
+def measure_border(trial: Trial, found: TrialResult, numbers: Sequence[int]) -> None:
+    """The border of the draw that has this place among ``numbers``, or why there is none."""
+    family, number = draws()[numbers[trial.seed]]
     step, near = (STEP_SOLVED, NEAR_SOLVED) if family.is_dynamic else (STEP, NEAR)
     found.values[PLAYS] = 0.0
 
@@ -149,8 +130,11 @@ def bisected(
     return math.sqrt(done * failed)
 
 
-ROWS = ((BORDER, "amplitude at which physics fails", ""), (PLAYS, "motions played to find it", ""))
-BORDERS = Study("borders", {"border": ROWS}, measure_border, prefix="")
+def borders_of(numbers: Sequence[int]) -> Study:
+    """The trials that bisect the draws of these numbers."""
+    rows = ((BORDER, "amplitude at which physics fails", ""), (PLAYS, "motions played", ""))
+    name, measure = digest(repr(numbers).encode()), partial(measure_border, numbers=numbers)
+    return Study(f"borders {name}", {"border": rows}, measure, prefix="")
 
 
 def read_borders(path: Path = BORDERS_FILE) -> dict[str, float | None]:
@@ -170,7 +154,7 @@ def read_borders(path: Path = BORDERS_FILE) -> dict[str, float | None]:
 
 def borders_version(path: Path = BORDERS_FILE) -> str:
     """A short hash of the file of borders: with others, the exam asks other questions."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:8] if path.exists() else "none"
+    return digest(path.read_bytes())[:8] if path.exists() else "none"
 
 
 def write_borders(borders: Mapping[str, float | None], path: Path = BORDERS_FILE) -> None:

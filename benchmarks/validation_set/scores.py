@@ -12,7 +12,7 @@ from typing import NamedTuple
 from scipy.stats import binomtest
 
 from benchmarks.validation_set.drawing import TEST, TRAIN
-from benchmarks.validation_set.physics import LENIENT, STOPS, STRICT, MotionFailures
+from benchmarks.validation_set.physics import LENIENT, STOPS, STRICT, Failures
 from benchmarks.validation_set.questions import STRATA
 from controller.motion_measurement import FELL, NOT_DONE, UNPLANNED
 
@@ -31,17 +31,17 @@ class Case:
     stratum: str  #: how its amplitude was chosen
     is_dynamic: bool  #: whether it is solved
     refusal: tuple[str, ...]  #: checks that refuse it; it passed if there is none
-    outcome: MotionFailures  #: what went wrong in physics
+    outcome: Failures  #: what went wrong in physics
 
     @property
     def has_plan(self) -> bool:
         """Whether there was anything to play."""
-        return UNPLANNED not in self.outcome.strict
+        return UNPLANNED not in self.outcome[STRICT]
 
     @property
     def is_wrong(self) -> bool:
         """Whether the check foretold something else than happened, strictly."""
-        return bool(self.refusal) is not bool(self.outcome.strict)
+        return bool(self.refusal) is not bool(self.outcome[STRICT])
 
 
 class Share(NamedTuple):
@@ -90,7 +90,7 @@ class Score(NamedTuple):
     @staticmethod
     def of(cases: Iterable[Case], definition: str = STRICT) -> Score:
         """The score on ``cases`` by a definition of ``controller.motion_measurement``."""
-        pairs = [(bool(case.refusal), bool(case.outcome.by(definition))) for case in cases]
+        pairs = [(bool(case.refusal), bool(case.outcome[definition])) for case in cases]
         counts = []
         for answer in (True, False):
             right = pairs.count((answer, answer))
@@ -140,10 +140,10 @@ def render(cases: Sequence[Case]) -> str:
         lines.append(_ROW.format(name=name, n=score.n, done=score.done_passed.n, shares=shares))
         if name.endswith(FELL):
             lines.append("-" * 80)
-    kinds = Counter(re.sub(r"[\d.]+ ", "", why) for c in cases for why in c.outcome.by(STRICT))
+    kinds = Counter(re.sub(r"[\d.]+ ", "", why) for c in cases for why in c.outcome[STRICT])
     counts = ", ".join(f"{kind} {n}" for kind, n in kinds.most_common())
     lines += textwrap.wrap(f"What went wrong, strictly: {counts or 'nothing'}.", 80)
-    wrong = [case.outcome.strict for case in cases if case.outcome.strict and case.has_plan]
+    wrong = [case.outcome[STRICT] for case in cases if case.outcome[STRICT] and case.has_plan]
     told = sum(NOT_DONE in reasons for reasons in wrong)
     said = f"Of {len(wrong)} motions that were played and went wrong, `play` says so of {told}."
     return "\n".join([*lines, said])
@@ -154,7 +154,7 @@ def wrong_ones(cases: Sequence[Case]) -> list[str]:
     return [
         f"{case.name} ({case.stratum}): "
         + (f"refused ({', '.join(case.refusal)})" if case.refusal else "passed")
-        + f"; {', '.join(case.outcome.strict) or 'done'}"
+        + f"; {', '.join(case.outcome[STRICT]) or 'done'}"
         for case in cases
         if case.half == TRAIN and case.is_wrong
     ]

@@ -158,4 +158,4 @@ def test_a_folder_that_cannot_be_made_is_told(
     (tmp_path / "file").write_text("", encoding="utf-8")
     rows = str(tmp_path / "file" / "in" / "rows.sqlite")
     assert main([*words.split(), "--rows", rows]) == ExitCode.USAGE
-    assert "cannot make the folder" in capsys.readouterr().err
+    assert "choose a folder" in capsys.readouterr().err

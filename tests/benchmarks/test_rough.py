@@ -19,20 +19,8 @@ from benchmarks.rough import (
 )
 from benchmarks.study import TrialResult
 from controller.sweeps.trials import Trial
-from go2_wbc.plant.terrain import Blocks, Stairs, Terrain
+from go2_wbc.plant.terrain import Blocks, Stairs
 from go2_wbc.robot.state import JointCommand
-
-
-def low(_: int) -> Terrain:
-    return Blocks(0.03, 0.5, count=1, start=0.6)
-
-
-def wall(_: int) -> Terrain:
-    return Stairs(0.5, 1, start=0.6)
-
-
-def two_stairs(_: int) -> Terrain:
-    return Stairs(0.14, 2, 0.31)
 
 
 def measured(way: Way, seed: int = 0) -> TrialResult:
@@ -40,7 +28,7 @@ def measured(way: Way, seed: int = 0) -> TrialResult:
 
 
 def test_who_comes_behind_the_end_in_time_and_stands_has_done_it() -> None:
-    way = Way("low", "a low block", low)
+    way = Way("low", "a low block", Blocks(0.03, 0.5, count=1, start=0.6))
     done = measured(way)
     assert set(done.values) == {metric.name for metric in way.study.metrics}
     assert done.values["low.done"] == 1.0
@@ -48,7 +36,7 @@ def test_who_comes_behind_the_end_in_time_and_stands_has_done_it() -> None:
 
 
 def test_who_meets_a_wall_has_not() -> None:
-    failed = measured(Way("wall", "a wall", wall, length=1.0))
+    failed = measured(Way("wall", "a wall", Stairs(0.5, 1, start=0.6), length=1.0))
     assert failed.values["wall.done"] == 0.0
     assert failed.failures["wall.done"] == failed.reason
 
@@ -57,7 +45,8 @@ def test_who_meets_a_wall_has_not() -> None:
 @pytest.mark.parametrize("seed", [6001, 6015])
 def test_the_trunk_rises_before_its_nose_meets_the_second_of_two_stairs(seed: int) -> None:
     # It was thrown back by its face, and these two fell: 11 of 20 came past it, 18 since.
-    climbed = measured(Way("stairs", "2 stairs of 14 cm", two_stairs, length=1.8), seed)
+    stairs = Stairs(0.14, 2, 0.31)
+    climbed = measured(Way("stairs", "2 stairs of 14 cm", stairs, length=1.8), seed)
     assert climbed.values["stairs.done"] == 1.0, climbed.reason
 
 

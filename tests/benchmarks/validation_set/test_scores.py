@@ -5,14 +5,18 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.validation_set.drawing import TEST, TRAIN
-from benchmarks.validation_set.physics import LENIENT, STRICT, MotionFailures
+from benchmarks.validation_set.physics import LENIENT, STOPS, STRICT, Failures
 from benchmarks.validation_set.scores import Case, Score, Share, render, scores, wrong_ones
 from controller.motion_measurement import FELL, NOT_DONE, UNPLANNED
 
 
+def strictly(*harm: str) -> Failures:
+    return {STRICT: harm, STOPS: harm, LENIENT: (), FELL: ()}
+
+
 def case(refused: bool, failed: bool, *, half: str = TEST, why: str = "slip 12 mm") -> Case:
     harm = (why,) if failed else ()
-    outcome = MotionFailures(harm, harm, (), ("fell",) if why == "fell" else ())
+    outcome = {**strictly(*harm), FELL: ("fell",) if why == "fell" else ()}
     refusal = ("friction",) if refused else ()
     return Case("name 0 1.0", half, "easy", False, refusal, outcome)
 
@@ -52,13 +56,13 @@ def test_the_table_has_both_halves_what_has_no_plan_and_what_play_noticed() -> N
     assert "slip" in table
     assert scores(cases)["train strict"].n == 100
     cases = [
-        Case("a", TEST, "easy", True, ("dynamic plan",), MotionFailures((UNPLANNED,), (), (), ())),
-        Case("b", TEST, "easy", True, (), MotionFailures((), (), (), ())),
+        Case("a", TEST, "easy", True, ("dynamic plan",), strictly(UNPLANNED)),
+        Case("b", TEST, "easy", True, (), strictly()),
     ]
     found = scores(cases)
     assert (found["test dynamic"].n, found["test solved"].n) == (2, 1)
-    told = replace(case(False, True), outcome=MotionFailures((NOT_DONE, "fell"), (), (), ()))
-    unplanned = replace(case(True, True), outcome=MotionFailures((UNPLANNED,), (), (), ()))
+    told = replace(case(False, True), outcome=strictly(NOT_DONE, "fell"))
+    unplanned = replace(case(True, True), outcome=strictly(UNPLANNED))
     said = render([told, case(True, True), case(False, False), unplanned]).splitlines()[-1]
     assert said.startswith("Of 2 motions that were played and went wrong")
     assert said.endswith("says so of 1.")
