@@ -26,6 +26,7 @@ where the robot lies:
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -167,11 +168,12 @@ EACH = 3.0  # s
 SLOPE = math.radians(15.0)
 MIXED = (-0.8, -0.5, -1.5), (1.5, 0.5, 1.5)
 """Range of what is commanded: ahead, to the left [m/s], turning [rad/s]."""
+Commands = Sequence[tuple[float, float, float]]
 
 
-def _place(plant: MujocoPlant) -> Float[np.ndarray, "2 3"]:
-    """x, y [m] and heading [rad] by the estimate, and in truth."""
-    return np.array([[*state.q[:2], state.yaw] for state in (plant.read(), plant.truth())])
+def _place(plant: MujocoPlant) -> Float[np.ndarray, "2 4"]:
+    """x, y, z [m] and heading [rad] by the estimate, and in truth."""
+    return np.array([[*state.q[:3], state.yaw] for state in (plant.read(), plant.truth())])
 
 
 def measure_drift(trial: Trial, found: TrialResult, seconds: int, *, walks: bool) -> None:
@@ -187,22 +189,21 @@ def measure_drift(trial: Trial, found: TrialResult, seconds: int, *, walks: bool
             robot.wait(1.0)
             robot.truth.clear()  # a minute's recording would be a gigabyte
         seen, true = _place(robot.plant) - before
-    turn = yaw_rotation(before[0, 2] - before[1, 2])[:2, :2]  # from the true world into its own
+    turn = yaw_rotation(before[0, 3] - before[1, 3])[:2, :2]  # from the true world into its own
     off, way = (float(np.linalg.norm(p)) for p in (seen[:2] - turn @ true[:2], true[:2]))
-    turned = float(abs(np.degrees(seen[2] - true[2] + np.pi) % 360.0 - 180.0))
+    turned = float(abs(np.degrees(seen[3] - true[3] + np.pi) % 360.0 - 180.0))
     if walks:
         found.values = {"drift": 100.0 * off / way, "turned": turned}
     else:
         found.values = {"creep": 1000.0 * off, "moved": 1000.0 * way}
 
 
-def measure_estimate(trial: Trial, found: TrialResult, terrain: Terrain | None, what: str) -> None:
-    """Walk on ``terrain``: ``"up"``, ``"over"``, round on a ``"slope"``, ``"mixed"`` for 60 s."""
+def measure_estimate(
+    trial: Trial, found: TrialResult, terrain: Terrain | None = None, commands: Commands = ()
+) -> None:
+    """Walk on ``terrain`` by the ``commands``, by default random ones for 60 s."""
     rng = np.random.default_rng(FIRST_SEED + trial.seed)
     friction, mass = rng.uniform(*FRICTION_RANGE), rng.uniform(*UNTOLD)
-    commands = {"up": [(0.5, 0.0, 0.0)] * 3, "mixed": rng.uniform(*MIXED, size=(20, 3)).tolist()}
-    commands["over"] = [(0.5, 0.0, 0.0)] * 5
-    commands["slope"] = [(0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, -0.3, 0.0)]
     plant = MujocoPlant(
         terrain=terrain,
         friction=friction,
@@ -213,13 +214,13 @@ def measure_estimate(trial: Trial, found: TrialResult, terrain: Terrain | None, 
     off: list[Float[np.ndarray, "3"]] = []
     with TrialRobot(plant) as robot:
         robot.require(robot.go2.walk())
-        before = _pose_off(plant)
+        before = np.subtract(*_place(plant))
         robot.truth.on_tick = lambda: off.append(plant.read().v[:3] - plant.truth().v[:3])
-        for ahead, left, turn in commands[what]:
+        for ahead, left, turn in commands or rng.uniform(*MIXED, size=(20, 3)).tolist():
             robot.go2.move(ahead, turn, linear_y=left)
             robot.wait(EACH)
             robot.truth.clear()
-        height, heading = _pose_off(plant) - before
+        *_, height, heading = np.subtract(*_place(plant)) - before
     second = round(1.0 / plant.control_period)
     seconds = np.array(off[: len(off) // second * second]).reshape(-1, second, 3).mean(axis=1)
     found.values = {
@@ -227,12 +228,6 @@ def measure_estimate(trial: Trial, found: TrialResult, terrain: Terrain | None, 
         "turned": math.degrees(abs(wrap_angle(float(heading)))),
         "velocity": float(np.linalg.norm(seconds, axis=1).max()),
     }
-
-
-def _pose_off(plant: MujocoPlant) -> Float[np.ndarray, "2"]:
-    """Height [m] and heading [rad] of the estimate less those in truth."""
-    seen, true = plant.read(), plant.truth()
-    return np.array([seen.q[2] - true.q[2], seen.yaw - true.yaw])
 
 
 _stand = partial(measure_drift, seconds=60, walks=False)
@@ -257,12 +252,13 @@ def _barred(which: str, most: float) -> tuple[tuple[str, str, str], ...]:
     )
 
 
-_ON_STAIRS = partial(measure_estimate, terrain=Stairs(), what="up")
-_ON_SLOPE = partial(measure_estimate, terrain=Slope(SLOPE), what="slope")
-_RAMP = Ramp(math.radians(20.0), length=2.0)
-_ON_RAMP = partial(measure_estimate, terrain=_RAMP, what="over")
-_ON_WAVES = partial(measure_estimate, terrain=Waves(), what="over")
-_MIXED = partial(measure_estimate, terrain=None, what="mixed")
+_AHEAD, _BACK = (0.5, 0.0, 0.0), (-0.5, 0.0, 0.0)
+_LEFT, _RIGHT = (0.0, 0.3, 0.0), (0.0, -0.3, 0.0)
+_RAMP, _ROUND = Ramp(math.radians(20.0), length=2.0), (_AHEAD, _BACK, _LEFT, _RIGHT)
+_ON_STAIRS = partial(measure_estimate, terrain=Stairs(), commands=3 * (_AHEAD,))
+_ON_SLOPE = partial(measure_estimate, terrain=Slope(SLOPE), commands=_ROUND)
+_ON_RAMP = partial(measure_estimate, terrain=_RAMP, commands=5 * (_AHEAD,))
+_ON_WAVES = partial(measure_estimate, terrain=Waves(), commands=5 * (_AHEAD,))
 ESTIMATED = tuple(
     Study(name, {f"sensors: {item}": rows}, measure, prefix, group="sensors", sensors=IMU)
     for name, item, rows, measure, prefix in (
@@ -271,7 +267,7 @@ ESTIMATED = tuple(
         ("stairs-height", "up 4 stairs of 8 cm, 9 s", _barred("height", 15), _ON_STAIRS, "stairs"),
         ("ramp-height", "over a ramp of 20 deg, 15 s", _barred("height", 15), _ON_RAMP, "ramp"),
         ("waves-height", "over waves of 8 cm, 15 s", _barred("height", 15), _ON_WAVES, "waves"),
-        ("mixed", "20 commands, 60 s", _barred("turned", 1.5), _MIXED, "mixed"),
+        ("mixed", "20 commands, 60 s", _barred("turned", 1.5), measure_estimate, "mixed"),
         ("slope", "to all sides on 15 deg, 12 s", _barred("velocity", 0.03), _ON_SLOPE, "slope"),
     )
 )

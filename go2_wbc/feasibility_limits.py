@@ -5,10 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from go2_wbc.brief import brief
-from go2_wbc.validation import POSITIVE, ranged
+from go2_wbc.validation import POSITIVE, ranged, retires
 
 
 @dataclass(frozen=True, slots=True)
+@retires(
+    drag_height=0.0005,
+    joint_jump=12.0,
+    body_jump=1.0,
+    turn_jump=5.0,
+    stance_position=0.02,
+    stance_angle=0.05,
+    end_speed=0.1,
+)
 @ranged(POSITIVE)
 class FeasibilityLimits:
     """Limits that a motion must keep. Own choice, set by comparing verdicts with simulated runs.
@@ -69,8 +78,6 @@ class FeasibilityLimits:
         swing_depth: how deep [m] the lowest point of a foot in the air may be planned below the
             ground: it stays above, so it is off by as much. Down to 12 mm feet were 14 to 27 mm off
             in MuJoCo, from 17 on more than the 30 that an author notices.
-        drag_height: height [m] of a foot's lowest point below which it is on the ground; planned
-            heights are exact, so this only absorbs rounding.
         drag: longest distance [m] that a foot that counts as raised may move along the ground. It
             bears next to nothing, and of 50 motions drawn for it that drag a foot by 0.02 to 0.33 m
             49 were done.
@@ -79,11 +86,6 @@ class FeasibilityLimits:
         flat_landing: horizontal distance [m] that a foot may still have to go when it is 4 mm above
             its foothold, if it is fast: one with 19 mm landed 18 mm beside it, one with 10 did not.
         landing_speed: greatest speed [m/s] of a foot at touchdown: taps with 1.4 were done.
-        joint_jump: greatest change [rad/s] of a joint's speed between samples of 10 ms.
-        body_jump, turn_jump: the same of the trunk's speed [m/s, rad/s]: a plan with a jump.
-            Motions that are just fast show in forces, torques and slips.
-        stance_position, stance_angle: how far [m, rad] the ends may be from their postures.
-        end_speed: greatest speed [m/s, rad/s] of trunk and joints at the ends.
     """
 
     reach: float = 0.015
@@ -112,17 +114,10 @@ class FeasibilityLimits:
     calf_clearance: float = 0.003
     solved_calf_clearance: float = 0.001
     swing_depth: float = 0.012
-    drag_height: float = 0.0005
     drag: float = 0.35
     rub: float = 0.02
     landing: float = 0.01
     flat_landing: float = 0.016
     landing_speed: float = 1.4
-    joint_jump: float = 12.0
-    body_jump: float = 1.0
-    turn_jump: float = 5.0
-    stance_position: float = 0.02
-    stance_angle: float = 0.05
-    end_speed: float = 0.1
 
     __repr__ = brief

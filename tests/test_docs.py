@@ -22,6 +22,7 @@ from go2_wbc.wbc.config import Gains
 from go2_wbc.world import World
 from motions import FeasibilityChecker, Timeline, check, compile_timeline, load_motion
 from motions.feasibility import FeasibilityLimits
+from motions.feasibility.kinematic import END_BOUNDS, JUMPS
 from motions.language.body_and_feet import POSES
 from motions.language.keys import BODY_CHANNELS, Frame
 from tests.motions.doctored import DoctoredPlan
@@ -239,9 +240,8 @@ def test_the_limits_in_the_table_are_those_of_the_checker() -> None:
         "landing place": f"<= {1000 * limits.landing:g} mm",
         "flat landing": f"<= {1000 * limits.flat_landing:g} mm",
         "landing speed": f"<= {limits.landing_speed:g} m/s",
-        "continuity": f"<= {limits.body_jump:g}, {limits.turn_jump:g}, {limits.joint_jump:g}",
-        "entry and exit": f"<= {limits.stance_position:g} m, {limits.stance_angle:g} rad, "
-        f"{limits.end_speed:g}",
+        "continuity": f"<= {JUMPS[0]:g}, {JUMPS[1]:g}, {JUMPS[2]:g}",
+        "entry and exit": "<= {:g} m, {:g} rad, {:g}".format(*END_BOUNDS),
     }
     for check_name, limit in shown.items():
         row = re.search(rf"^\| \*\*{check_name}\*\* .*$", page(FEASIBILITY), re.MULTILINE)

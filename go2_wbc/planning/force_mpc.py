@@ -21,7 +21,7 @@ from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
 from go2_wbc.planning.footholds import excess_velocity, foothold, nominal_feet
 from go2_wbc.planning.gait_clock import Clock
-from go2_wbc.planning.ground import ground_at, haste, is_rough, on_leash, tilt
+from go2_wbc.planning.ground import EASE, ground_at, haste, is_rough, on_leash, tilt
 from go2_wbc.planning.mpc import INTERVAL, NODES, STEP, Horizon, solve_mpc
 from go2_wbc.planning.trunk import Command, advance_pose, pose_turn, ramp
 from go2_wbc.planning.walk import Planner, Walk, carried_height
@@ -211,7 +211,7 @@ def look_ahead(now: Snapshot, s: Planner, c: Walk, command: Command) -> None:
     fill_arms(now, s, c)
     lean_goals(s, c, command)
     for k in range(NODES):
-        s.horizon.goals[k, 5] = on_leash(s.ground, c.config.rough, s.horizon.goals[k, 5], now)
+        s.horizon.goals[k, 5] = on_leash(s.ground, s.horizon.goals[k, 5], now)
 
 
 @subroutine
@@ -259,5 +259,5 @@ def apply_force_plan(now: Snapshot, s: Planner, c: Walk, command: Command, targe
     target.a_world[2] -= c.gravity
     target.force_weight = mpc.prior_weight
     x, y = excess_velocity(now, s, c)
-    ease = c.config.rough.ease if is_rough(s.ground) else 0.0
+    ease = EASE if is_rough(s.ground) else 0.0
     target.orientation_discount = max(np.hypot(x, y) / mpc.throw_speed, ease)

@@ -4,7 +4,7 @@ The plane z = h + s (p - p_com), in the world, with its height h below the CoM a
 carried along with the CoM. Where feet are met, h takes in a share of how far they are off it, and s
 a share of the slope of the plane that fits, by least squares, where each foot was met last. How far
 they are off it is also what tells rough ground, on which feet are raised higher, and the robot goes
-more slowly, in quicker strides, until it has come ``RoughConfig.way`` without any.
+more slowly, in quicker strides, until it has come ``MEMORY`` without any.
 
 Its friction is told by feet that slide. Of ground on which the robot has not walked yet nothing is
 known. The estimate begins low there (``LocomotionConfig.ground_friction``), and rises as it steps
@@ -42,7 +42,7 @@ from go2_wbc.algebra.linear import cross, dot, plus_scaled, triple
 from go2_wbc.compilation import Foreign, subroutine
 from go2_wbc.records import Array3, Record
 from go2_wbc.robot.state import Snapshot
-from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
+from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged, retires
 
 GROUND_SHARE = 0.5
 """Share of a landing foot's height that goes into the estimate of the ground's height. A pitch that
@@ -59,7 +59,8 @@ FOLLOW = 0.7  #: Share of the slope by which the trunk is tilted
 SMOOTH, MOST_RAISE = 0.015, 0.05
 """Distance [m] of a landing from the plane up to which the ground is smooth. As much as it is
 rougher than that is added to the apex of a swing, the latter [m] at most."""
-ROUGH = 0.03  #: Roughness [m] from which on ground is rough
+ROUGH, HIGH = 0.03, 0.09  #: Roughness [m] from which on ground is rough, and its steps are high
+MEMORY = 1.7  #: For how far [m] either is remembered
 ROUGH_PACE = 0.85
 """Speed [m/s] up to which that holds; as much faster, as much rougher: a robot at 3 m/s whose foot
 brushes the ground once in a swing goes on."""
@@ -69,6 +70,13 @@ steep: on stairs every other foot tells it anew, but on a ramp it is only its be
 FIRST_WAY = 0.5
 """For how far [m] the first step is taken for a high one, after one up the next is expected, and
 behind a ramp a slope is taken for its."""
+FIRST_RAISED, FIRST_LIFT, FIRST_LEAN = 0.08, 0.04, 0.12
+"""Least height [m] by which a swing is higher on rough ground that is level: a foot that meets the
+first step does not tell how high it is, and the next one must not meet it as well. Height [m] by
+which the trunk is carried higher while a first step is expected, and slope by which its leading end
+is raised then. With the trunk as on smooth ground, its nose met the face of the second of those
+stairs before it had risen, and the robot was thrown back. Carried on to where the ground falls
+away, lift and lean would keep the feet from reaching it."""
 LIFT_RATE, LEAN_RATE, LEAN_SPEED = 0.3, 1.0, 0.1
 """Greatest rate [m/s] at which the trunk is lifted for it, and [1/s] at which its leading end is,
 and speed [m/s] from which on the latter is in full."""
@@ -107,6 +115,14 @@ says nothing of the friction."""
 FRICTION_FALL_TIME, FRICTION_RISE = 0.03, 0.1
 """Time constant [s] of the fall, and rate [1/s] of the rise."""
 LEAST_FRICTION, MOST_FRICTION = 0.12, 0.6  #: Bounds of the estimate
+LEASH = 0.04
+"""Greatest distance [m], on rough ground, of the height asked of the CoM from that it has. A foot
+that meets a step makes the wanted height jump: 9 cm at once threw the robot into the air, from
+where it fell."""
+EASE = 4.0
+"""By 1 plus this the weight of the trunk's attitude is divided there. On friction that is believed
+to be low, the moment of a swing takes twice the robot's weight on the feet; with its weight ten
+times that of the place the attitude got it, and the robot took off."""
 HALF_SPEED = 0.5
 """Speed [m/s] of a sliding contact point at which the ground bears half of the force along it that
 the torques make."""
@@ -114,46 +130,33 @@ _TINY = 1e-9  #: Force [N], over a determinant, that stands in for none where on
 
 
 @dataclass(frozen=True, slots=True)
+@retires(
+    high=HIGH,
+    way=MEMORY,
+    first_raised=FIRST_RAISED,
+    first_lift=FIRST_LIFT,
+    first_lean=FIRST_LEAN,
+    leash=LEASH,
+    ease=EASE,
+)
 @ranged(NOT_NEGATIVE, speed=POSITIVE)
 class RoughConfig:
     """How the robot walks where its feet have found the ground rough.
 
     Attributes:
         speed: greatest speed [m/s].
-        high: distance [m] from the plane at which feet meet high steps.
-        high_speed: greatest speed [m/s] among these; the first step, of which that is not known
-            yet, is taken for one.
-        way: for how far [m] either is remembered.
-        raised: least height [m] by which a swing is higher.
-        first_raised: the same as long as the ground has no slope: a foot that meets the first step
-            does not tell how high it is, and the next one must not meet it as well.
+        high_speed: greatest speed [m/s] among high steps; the first step, of which that is not
+            known yet, is taken for one.
+        raised: least height [m] by which a swing is higher on a slope.
         swing: time [s] by which it is longer.
         stance: longest time [s] that a foot stands, if that is not shorter already.
-        first_lift: height [m] by which the trunk is carried higher while a first step is expected.
-        first_lean: slope by which its leading end is raised then. With the trunk as on smooth
-            ground, its nose met the face of the second of those stairs before it had risen, and the
-            robot was thrown back. Carried on to where the ground falls away, lift and lean would
-            keep the feet from reaching it.
-        leash: greatest distance [m] of the height that is asked of the CoM from that it has. A foot
-            that meets a step makes the wanted height jump: 9 cm at once threw the robot into the
-            air, from where it fell.
-        ease: by 1 plus this the weight of the trunk's attitude is divided. On friction that is
-            believed to be low, the moment of a swing takes twice the robot's weight on the feet;
-            with its weight ten times that of the place the attitude got it, and the robot took off.
     """
 
     speed: float = 0.5
-    high: float = 0.09
     high_speed: float = 0.43
-    way: float = 1.7
     raised: float = 0.02
-    first_raised: float = 0.08
-    first_lift: float = 0.04
-    first_lean: float = 0.12
     swing: float = 0.04
     stance: float = 0.16
-    leash: float = 0.04
-    ease: float = 4.0
 
 
 class Ground(Record):
@@ -240,12 +243,12 @@ def slow_down(g: Ground, c: RoughConfig, delay: float, velocity: Array3) -> None
 
 
 @subroutine
-def on_leash(g: Ground, c: RoughConfig, height: float, now: Snapshot) -> float:
+def on_leash(g: Ground, height: float, now: Snapshot) -> float:
     """Height [m] asked of the CoM, where on smooth ground it were ``height``."""
     if not is_rough(g):
         return height
     z = now.p_world_com[2]
-    return min(max(height, z - c.leash), z + c.leash)
+    return min(max(height, z - LEASH), z + LEASH)
 
 
 @subroutine
@@ -265,7 +268,7 @@ def apex_raise(g: Ground, c: RoughConfig) -> float:
     """Height [m] by which a swing is higher than on smooth ground."""
     if not is_rough(g):
         return raised(g)
-    return max(raised(g), c.raised + levelness(g) * (c.first_raised - c.raised))
+    return max(raised(g), c.raised + levelness(g) * (FIRST_RAISED - c.raised))
 
 
 @subroutine
@@ -329,17 +332,17 @@ def is_met_rough(g: Ground, now: Snapshot) -> bool:
 
 
 @subroutine
-def carry_ground(g: Ground, c: RoughConfig, now: Snapshot, dt: float) -> None:
+def carry_ground(g: Ground, now: Snapshot, dt: float) -> None:
     """Follow the CoM, after ``dt`` seconds."""
     speed = np.hypot(now.v_world_com[0], now.v_world_com[1])
     is_met = is_met_rough(g, now)
-    way = c.way if g.roughness > c.high else FIRST_WAY if is_met and not is_rough(g) else 0.0
+    way = MEMORY if g.roughness > HIGH else FIRST_WAY if is_met and not is_rough(g) else 0.0
     steep = min(max(np.hypot(g.slope[0], g.slope[1]) / STEEP - 1.0, 0.0), 1.0)
     come = speed * dt * (1.0 + (STEEP_FORGETS - 1.0) * steep)
     is_ramp = steep > 0.0 and not is_rough(g)
     g.ramp_way = FIRST_WAY if is_ramp else max(g.ramp_way - speed * dt, 0.0)
     g.high_way = max(g.high_way - come, way)
-    g.rough_way = max(g.rough_way - come, c.way if is_met else 0.0)
+    g.rough_way = max(g.rough_way - come, MEMORY if is_met else 0.0)
     least = min(g.p_met[0, 2], g.p_met[1, 2], g.p_met[2, 2], g.p_met[3, 2])
     g.low = min(g.low + FORGETS * speed * dt, least) if is_rough(g) else least
     x, y = now.p_world_com[0], now.p_world_com[1]
@@ -348,18 +351,16 @@ def carry_ground(g: Ground, c: RoughConfig, now: Snapshot, dt: float) -> None:
 
 
 @subroutine
-def expect_steps(
-    g: Ground, c: RoughConfig, now: Snapshot, ahead: tuple[float, float], dt: float
-) -> None:
+def expect_steps(g: Ground, now: Snapshot, ahead: tuple[float, float], dt: float) -> None:
     """Carry the trunk for a step up that may follow, on its way ``ahead`` [m/s]."""
     speed = np.hypot(ahead[0], ahead[1])
     g.rise_way -= min(np.hypot(now.v_world_com[0], now.v_world_com[1]) * dt, g.rise_way)
     share = levelness(g) if is_rough(g) and g.rise_way > 0.0 else 0.0
     most = LIFT_RATE * dt
-    g.lift += min(max(share * c.first_lift - g.lift, -most), most)
+    g.lift += min(max(share * FIRST_LIFT - g.lift, -most), most)
     most = LEAN_RATE * dt
     for i in range(2):
-        lean = share * c.first_lean * ahead[i] / max(speed, LEAN_SPEED)
+        lean = share * FIRST_LEAN * ahead[i] / max(speed, LEAN_SPEED)
         g.lean[i] += min(max(lean - g.lean[i], -most), most)
 
 

@@ -184,8 +184,8 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
         follow_position(trunk, now, config.position_leash, dt)
     else:
         rest_in_place(now, s, config.position_leash, dt)
-    carry_ground(s.ground, config.rough, now, dt)
-    expect_steps(s.ground, config.rough, now, world_velocity(trunk), dt)
+    carry_ground(s.ground, now, dt)
+    expect_steps(s.ground, now, world_velocity(trunk), dt)
     correct_height(trunk, now, s.ground.height + carried_height(s, c), dt)
 
 
@@ -315,7 +315,7 @@ def plan(
     note_liftoffs(now, s, c, contact, stance, progress)
     target.friction = level_friction(s.ground, s.slip.friction, LEAST_FRICTION)
     fill_body(s.trunk, s.ground, carried_height(s, c), target)
-    target.p_world[2] = on_leash(s.ground, c.config.rough, target.p_world[2], now)
+    target.p_world[2] = on_leash(s.ground, target.p_world[2], now)
     level(s.trunk, now, contact, s.is_stepping, dt, target)
     fill_feet(now, s, c, stance, stands, elapsed, remaining, target, m, dt)
     target.q_joints[:] = now.q[7:]

@@ -30,6 +30,14 @@ LOW, FAST = 0.004, 0.45
 """Height [m] above its place at which a foot may meet the ground, as trunks lag by that, and speed
 [m/s] along it from which on it stays there: feet of 0.5 and 1.6 m/s with 19 mm to go landed 18 and
 more beside their places, 8 that had 15 to 44 mm to go at up to 0.4 m/s came to them."""
+ON_GROUND = 0.0005
+"""Height [m] of a foot's lowest point below which it is on the ground: planned heights are exact,
+and it only absorbs rounding."""
+JUMPS = (1.0, 5.0, 12.0)
+"""Greatest changes of speed between samples of 10 ms, of trunk [m/s], attitude and joints [rad/s],
+of a plan without a jump. Motions that are just fast show in forces, torques and slips."""
+END_BOUNDS = (0.02, 0.05, 0.1)
+"""How far [m, rad] the ends may be from their postures, and greatest speed [m/s, rad/s] there."""
 PAIR = 2  #: Standing feet over which a trunk can fall to its side
 TIGHT_ANGLE, TIGHT_SPEED = 0.03, 0.1
 """Margins below which a warning is due: rad, and share of the least speed limit; own choice."""
@@ -151,7 +159,7 @@ def dragging(case: Case) -> Series:
     warning. The way is summed for as long as the foot stays that low.
     """
     motion, limits, places = case.path, case.limits, case.places
-    rubs = (places[:, :, 2] - case.model.foot_radius < limits.drag_height) & ~motion.stance
+    rubs = (places[:, :, 2] - case.model.foot_radius < ON_GROUND) & ~motion.stance
     rubs &= ~motion.is_dynamic[:, None]
     steps = np.linalg.norm(np.diff(places[:, :, :2], axis=0), axis=2)
     ways = np.zeros(rubs.shape)
@@ -209,11 +217,10 @@ def smoothness(case: Case) -> Series:
 
     A limit on |v_i+1 - v_i|, so on the acceleration over a sample: 400 rad/s^2 of a joint.
     """
-    motion, limits = case.path, case.limits
+    motion = case.path
     jumps = np.vstack([np.zeros(18), np.abs(np.diff(motion.v, axis=0))])
     values = np.maximum.reduceat(jumps, (0, 3, 6), axis=1)
-    bounds = np.array([limits.body_jump, limits.turn_jump, limits.joint_jump])
-    subjects = ("trunk", "trunk turning", "joints")
+    subjects, bounds = ("trunk", "trunk turning", "joints"), np.array(JUMPS)
     written = ~motion.is_dynamic
     written[1:] &= ~motion.is_dynamic[:-1]
     return case.series("continuity", "/s", subjects, values, bounds, where=written[:, None])
@@ -225,10 +232,10 @@ def ends(case: Case, plan: MotionPlan) -> Series:
     They are above the feet as they stand then, with their heading. A foot that is lifted from the
     first instant on still stands then.
     """
-    motion, model, limits = case.path, case.model, case.limits
+    motion, model = case.path, case.model
     home, places = home_poses(model), case.places[0]
     names = tuple(f"{end} {what}" for end in ENDS for what in ("place", "attitude", "speed"))
-    bounds = np.array([limits.stance_position, limits.stance_angle, limits.end_speed] * 2)
+    bounds = np.array(END_BOUNDS * 2)
     values = []
     for row, posture in ((0, plan.entry), (-1, plan.exit)):
         feet = Anchor.of_feet(motion.p_feet[row], model.foot_radius)

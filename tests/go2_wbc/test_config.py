@@ -72,6 +72,8 @@ def test_an_envelope_that_is_not_configured_is_the_careful_one_beside_hardware(
         ("[locomotion.mpc]\nenabled = false", r"MpcConfig.enabled .*every gait are planned ahead"),
         ("[locomotion]\nload_ramp = 0.02", r"load_ramp .*LocomotionConfig\.mpc\.load_ramp counts"),
         ("[locomotion.mpc]\nstep = 0.05", r"MpcConfig\.step .*: it is always 0\.03"),
+        ("[locomotion.rough]\nleash = 0.05", r"RoughConfig\.leash .*: it is always 0\.04"),
+        ("[feasibility]\nend_speed = 0.2", r"FeasibilityLimits\.end_speed .*: it is always 0\.1"),
         ("[locomotion.slip]\nmost = 0.9", r"LocomotionConfig\.slip .*, most=0\.6, half_speed=0\.5"),
     ],
 )

@@ -11,12 +11,16 @@ from go2_wbc.planning.ground import (
     EARLIER,
     FAST,
     FAST_HASTE,
+    FIRST_LEAN,
+    FIRST_LIFT,
+    FIRST_RAISED,
     FIRST_WAY,
     FORGETS,
     FRICTION_RISE,
     GROUND_SHARE,
     HALF_SPEED,
     HASTE_FRICTION,
+    HIGH,
     LATE,
     LATE_ASIDE,
     LATE_HASTE,
@@ -24,6 +28,7 @@ from go2_wbc.planning.ground import (
     LEAN_RATE,
     LEAST_FRICTION,
     LIFT_RATE,
+    MEMORY,
     MOST_FRICTION,
     MOST_RAISE,
     MOST_SLOPE,
@@ -110,7 +115,7 @@ def test_it_is_carried_along_with_the_robot() -> None:
     snapshot = on_plane(SLOPE)
     ground = plane(snapshot)
     moved = snapshot.replaced(p_world_com=snapshot.p_world_com + [0.5, 0.2, 0.0])
-    carry_ground(ground, CONFIG, moved, TICK)
+    carry_ground(ground, moved, TICK)
     assert ground.height == pytest.approx(0.4 + SLOPE @ [0.5, 0.2], abs=EXACT)
 
 
@@ -118,11 +123,11 @@ def test_the_robot_goes_slowly_on_rough_ground_and_for_a_way_after_it() -> None:
     snapshot, asked = on_plane(np.zeros(2)), np.array([1.2, -0.9, 2.0])
     ground = plane(snapshot)
     walking = snapshot.replaced(v_world_com=np.array([0.5, 0.0, 0.0]))
-    half = 0.5 * CONFIG.way / 0.5  # s, in which half of the way is come
+    half = 0.5 * MEMORY / 0.5  # s, in which half of the way is come
 
     def told() -> np.ndarray:
         velocity = asked.copy()
-        carry_ground(ground, CONFIG, walking, half)
+        carry_ground(ground, walking, half)
         slow_down(ground, CONFIG, 0.0, velocity)
         return velocity
 
@@ -130,18 +135,18 @@ def test_the_robot_goes_slowly_on_rough_ground_and_for_a_way_after_it() -> None:
     ground.roughness = 1.01 * ROUGH
     np.testing.assert_allclose(told(), asked * CONFIG.high_speed / 1.5)  # the first step
     np.testing.assert_allclose(told(), asked * CONFIG.speed / 1.5)
-    ground.roughness = 1.01 * CONFIG.high
+    ground.roughness = 1.01 * HIGH
     slowly = asked * CONFIG.high_speed / 1.5
     np.testing.assert_allclose(told(), slowly)
     ground.roughness = 0.99 * ROUGH
     np.testing.assert_allclose(told(), slowly)
-    carry_ground(ground, CONFIG, snapshot, 100.0)  # one that stands does not forget
+    carry_ground(ground, snapshot, 100.0)  # one that stands does not forget
     assert is_rough(ground)
     np.testing.assert_array_equal(told(), asked)
-    ground.roughness = 1.01 * CONFIG.high
+    ground.roughness = 1.01 * HIGH
     told()
     ground.roughness, ground.slope[0] = 0.0, 2.0 * STEEP  # a ramp, that is as feet expect it
-    carry_ground(ground, CONFIG, walking, 1.01 * CONFIG.way / 0.5 / STEEP_FORGETS)
+    carry_ground(ground, walking, 1.01 * MEMORY / 0.5 / STEEP_FORGETS)
     assert not is_rough(ground)
 
 
@@ -202,9 +207,9 @@ def test_an_upright_cone_lies_within_that_about_the_normal_of_a_slope(friction: 
     assert level_friction(ground, friction, 0.01) == pytest.approx(friction)  # as on stairs
     ground.rough_way, ground.slope[:] = 0.0, 2.0 * SLOPE
     walking = on_plane(SLOPE).replaced(v_world_com=np.array([0.5, 0.0, 0.0]))
-    carry_ground(ground, CONFIG, walking, 0.0)  # a ramp: smooth and steep
+    carry_ground(ground, walking, 0.0)  # a ramp: smooth and steep
     assert level_friction(ground, friction, 0.01) < friction - 0.1  # as behind it its crest is met
-    carry_ground(ground, CONFIG, walking, FIRST_WAY / 0.5)
+    carry_ground(ground, walking, FIRST_WAY / 0.5)
     assert level_friction(ground, friction, 0.01) == pytest.approx(friction)
     assert level_friction(plane(on_plane(np.zeros(2))), friction, 0.01) == friction
 
@@ -233,7 +238,7 @@ def test_a_step_raises_the_swing_for_a_while_and_smooth_ground_does_not() -> Non
         learn(ground, snapshot.p_world_feet, np.ones(4, dtype=bool))
     assert apex_raise(ground, CONFIG) == 0.0
     ground.rough_way = 0.1
-    for steep, raised in ((0.0, CONFIG.first_raised), (1.01 * STEEP, CONFIG.raised)):
+    for steep, raised in ((0.0, FIRST_RAISED), (1.01 * STEEP, CONFIG.raised)):
         ground.slope[:] = steep, 0.0
         assert apex_raise(ground, CONFIG) == pytest.approx(raised)
     assert delay(ground) == 0.0
@@ -242,14 +247,14 @@ def test_a_step_raises_the_swing_for_a_while_and_smooth_ground_does_not() -> Non
 def test_feet_arrive_earlier_on_stairs_that_rise_but_not_on_a_block() -> None:
     snapshot, up = on_plane(np.zeros(2)), (0.5, 0.0)
     ground, walking = plane(snapshot), snapshot.replaced(v_world_com=np.array([0.5, 0.0, 0.0]))
-    carry_ground(ground, CONFIG, walking, 0.0)
+    carry_ground(ground, walking, 0.0)
     ground.slope[0], ground.roughness = 2.0 * STEEP, 2.0 * ROUGH
     for climbed, expected in ((0.9 * CLIMBED, 0.0), (1.1 * CLIMBED, EARLIER)):
         ground.p_met[:, 2] = snapshot.p_world_feet[:, 2] + climbed  # with all feet on a block
-        carry_ground(ground, CONFIG, walking, 0.0)
+        carry_ground(ground, walking, 0.0)
         assert earliness(ground, up) == pytest.approx(expected)
     assert earliness(ground, (-0.5, 0.0)) == 0.0
-    carry_ground(ground, CONFIG, walking, 0.11 * CLIMBED / FORGETS / 0.5)
+    carry_ground(ground, walking, 0.11 * CLIMBED / FORGETS / 0.5)
     assert earliness(ground, up) == 0.0, "the lowest place is far behind"
     ground.low -= CLIMBED
     ground.rough_way = 0.0
@@ -264,7 +269,7 @@ def test_the_trunk_is_carried_for_the_next_step_up_until_the_ground_falls_or_a_w
     ground = plane(snapshot)
 
     def carried(time: float) -> tuple[float, tuple[float, float]]:
-        expect_steps(ground, CONFIG, walking, ahead, time)
+        expect_steps(ground, walking, ahead, time)
         return ground.lift, tilt(ground)
 
     note_stumble(ground)
@@ -273,17 +278,17 @@ def test_the_trunk_is_carried_for_the_next_step_up_until_the_ground_falls_or_a_w
     lift, lean = carried(0.01)
     assert lift == pytest.approx(0.01 * LIFT_RATE)
     assert lean == pytest.approx((-0.01 * LEAN_RATE, 0.01 * LEAN_RATE))
-    raised = CONFIG.first_lift, pytest.approx(CONFIG.first_lean * np.array(ahead) / 0.5)
+    raised = FIRST_LIFT, pytest.approx(FIRST_LEAN * np.array(ahead) / 0.5)
     assert carried(0.5) == raised
     carried(FIRST_WAY / 0.5)
     assert carried(0.5) == (0.0, (0.0, 0.0))
     for off, share in ((1.1 * ROUGH, 1.0), (-3.0 * ROUGH, 0.0)):
         learn(ground, snapshot.p_world_feet + [0.0, 0.0, off], feet)
         ground.slope[:] = 0.0
-        assert carried(0.5)[0] == pytest.approx(share * CONFIG.first_lift)
+        assert carried(0.5)[0] == pytest.approx(share * FIRST_LIFT)
     note_stumble(ground)
     ground.slope[0] = 0.5 * STEEP
-    assert carried(0.5)[0] == pytest.approx(0.5 * CONFIG.first_lift), "as far as it is level"
+    assert carried(0.5)[0] == pytest.approx(0.5 * FIRST_LIFT), "as far as it is level"
 
 
 def sliding(

@@ -9,8 +9,8 @@ import pytest
 from go2_wbc.contacts import GAITS, Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.footholds import LEAST_GAP
-from go2_wbc.planning.ground import GROUND_SHARE, MOST_FRICTION
-from go2_wbc.planning.locomotion import HURRY, LocomotionConfig, LocomotionPlanner
+from go2_wbc.planning.ground import EASE, GROUND_SHARE, LEASH, MOST_FRICTION
+from go2_wbc.planning.locomotion import HURRY, LocomotionPlanner
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.rotations import log_rotation, yaw_rotation
 from go2_wbc.robot.state import Snapshot
@@ -435,15 +435,15 @@ def test_feet_that_touch_higher_up_raise_the_reference_and_no_others(is_touching
 @pytest.mark.parametrize("is_rough", [True, False])
 def test_a_high_step_does_not_throw_a_robot_on_rough_ground(is_rough: bool) -> None:
     """Asked to be 9 cm higher at once, and level at any price, it jumped off blocks of 14 cm."""
-    start, rough = touching(resting()), LocomotionConfig().rough
+    start = touching(resting())
     planner = started(start)
     ground, goals = planner._state.ground, planner._state.horizon.goals
     ground.height += 0.2
     ground.rough_way = float(is_rough)
     reference = planner.update(at(start, TICK), VelocityCommand(0.2))
     asked = np.array([reference.body.p_world[2], *goals[:, 5]]) - start.p_world_com[2]
-    assert np.all(np.abs(asked - rough.leash) < EXACT) if is_rough else np.all(asked > 0.15)
-    assert reference.orientation_discount == (rough.ease if is_rough else 0.0)
+    assert np.all(np.abs(asked - LEASH) < EXACT) if is_rough else np.all(asked > 0.15)
+    assert reference.orientation_discount == (EASE if is_rough else 0.0)
 
 
 def test_the_ground_is_where_a_foot_is_first_touched_not_where_it_goes_on_to() -> None:
