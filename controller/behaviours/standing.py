@@ -35,8 +35,8 @@ from go2_wbc.geometry import support_margin
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
-from go2_wbc.planning.ground import MOST_FRICTION
 from go2_wbc.planning.locomotion import LEAST_HEIGHT, LocomotionConfig
+from go2_wbc.planning.slip import MOST_FRICTION
 from go2_wbc.records import Array4x3
 from go2_wbc.reference import SWING, Reference, Target
 from go2_wbc.robot.model import RobotModel

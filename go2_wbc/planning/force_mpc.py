@@ -79,7 +79,7 @@ def fill_goals(s: Planner, c: Walk, command: Command) -> None:
     a, b = tilt(s.ground)
     steep = np.hypot(a, b)
     as_angle = np.arctan(steep) / steep if steep > 0.0 else 1.0
-    share = haste(s.ground, s.slip.friction, s.delay, s.trunk.velocity)
+    share = haste(s.ground, config.rough, s.slip.friction, s.delay, s.trunk.velocity)
     linear = share * config.linear_acceleration
     goals[:] = 0.0
     for k in range(NODES):

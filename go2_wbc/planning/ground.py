@@ -1,34 +1,10 @@
-"""The ground below a walking robot: a plane through where its feet have met it, and its friction.
+"""The ground below a walking robot: the plane on which its feet have met it, and what it permits.
 
 The plane z = h + s (p - p_com), in the world, with its height h below the CoM and its slope s, is
 carried along with the CoM. Where feet are met, h takes in a share of how far they are off it, and s
 a share of the slope of the plane that fits, by least squares, where each foot was met last. How far
 they are off it is also what tells rough ground, on which feet are raised higher, and the robot goes
 more slowly, in quicker strides, until it has come ``MEMORY`` without any.
-
-Its friction is told by feet that slide. Of ground on which the robot has not walked yet nothing is
-known. The estimate begins low there (``LocomotionConfig.ground_friction``), and rises as it steps
-and nothing slides: a walk that began with 0.6 slid at once on a friction of 0.2, and where commands
-act 10 ms late as well it fell in its first second. With 0.2 it follows a curve as it begins by 0.03
-m/s less exactly, and withstands the same pushes. A robot that stands on the feet of one side, or of
-one end, pushes along the ground or tips over: until a foot has slid it counts on ``MOST_FRICTION``.
-
-A foot that carries load and slides has less friction than it was counted on. While one does, the
-estimate falls towards what that foot shows, and otherwise it recovers, slowly:
-
-    mu' = (mu_shown - mu) / T   while a foot slides,    mu' = r   else,    mu <= mu_most
-    mu_shown = f_t / f_n / (1 + v / v_half),    mu_least <= mu_shown <= mu
-
-The forces along the ground and into it, ``f_t`` and ``f_n``, are those that the measured torques of
-the foot's leg make. Part of ``f_t`` has gone into the leg that slides, not into the ground: more
-of it the faster it is. A foot that creeps at the edge of its friction, as one that a push has
-overloaded, shows nearly the ratio that it bore, and the estimate hardly falls. To fall towards the
-least at every slide took the force away with which the robot would have caught itself.
-
-A foot slides if its contact point has been faster than a speed for some time. Just after touchdown
-it may: there the foot still comes to rest. One that chatters while it slides, which on the robot's
-own sensors made it fall on a friction of 0.2, has not come down anew: what it has stood passes away
-while it does not touch, from twice the time after touchdown on.
 """
 
 from __future__ import annotations
@@ -38,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from go2_wbc.algebra.linear import cross, dot, plus_scaled, triple
-from go2_wbc.compilation import Foreign, subroutine
+from go2_wbc.compilation import subroutine
+from go2_wbc.planning.slip import LEAST_FRICTION
 from go2_wbc.records import Array3, Record
 from go2_wbc.robot.state import Snapshot
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged, retires
@@ -93,7 +69,11 @@ the robot falls. Faster aside, the foot that comes down strikes the one beside i
 QUICK, FAST, FAST_HASTE = 2.0, 2.6, 0.2
 """The same by the speed [m/s]: motors that turn fast have less torque, and the trunk sinks where it
 is asked for more."""
-ROUGH_HASTE = 1.0 / 7.0  #: Share of the accelerations that is left there
+ROUGH_HASTE = 1.0 / 7.0  #: Share of these that is left on rough ground
+TOO_FAST, ROUGH_BRAKE = 1.25, 0.4
+"""How many times as fast as rough ground permits the robot brakes, and with what share at most. By
+``ROUGH_HASTE`` of it, on a friction of 0.3, it still went at 0.85 m/s two steps below the edge that
+it had walked over at 1 m/s: on its own sensors 1 of 12 robots came down stairs of 11 cm, now 9."""
 CALMING = 0.8  #: Share of the roughness that is left after a landing
 STUMBLE = 0.06  #: Roughness [m] that a foot tells which is stopped in the middle of its swing
 DELAY = 0.4
@@ -104,17 +84,6 @@ EARLIER, CLIMBED, FORGETS = 0.15, 0.17, 0.1
 still went ahead slid down along the face of the next step. Feet are there if they have come higher
 than one step [m]; the lowest place counts as this much [m] higher with each m that the robot goes.
 """
-SLIP_SPEED, SLIP_PATIENCE = 0.1, 0.004
-"""Speed [m/s] of the contact point, along the ground, above which a foot slides, and the time [s]
-for which it must. These numbers are from a search on this robot in simulation."""
-TOUCHDOWN_MASK = 0.02
-"""Time [s] after touchdown in which a foot may slide. At 3 m/s feet that hold slide longer."""
-MOST_STEEPNESS = 0.35
-"""Greatest ratio of the point's vertical speed to that: a foot that comes off the edge of a step
-says nothing of the friction."""
-FRICTION_FALL_TIME, FRICTION_RISE = 0.03, 0.1
-"""Time constant [s] of the fall, and rate [1/s] of the rise."""
-LEAST_FRICTION, MOST_FRICTION = 0.12, 0.6  #: Bounds of the estimate
 LEASH = 0.04
 """Greatest distance [m], on rough ground, of the height asked of the CoM from that it has. A foot
 that meets a step makes the wanted height jump: 9 cm at once threw the robot into the air, from
@@ -123,10 +92,7 @@ EASE = 4.0
 """By 1 plus this the weight of the trunk's attitude is divided there. On friction that is believed
 to be low, the moment of a swing takes twice the robot's weight on the feet; with its weight ten
 times that of the place the attitude got it, and the robot took off."""
-HALF_SPEED = 0.5
-"""Speed [m/s] of a sliding contact point at which the ground bears half of the force along it that
-the torques make."""
-_TINY = 1e-9  #: Force [N], over a determinant, that stands in for none where one divides by it
+_TINY = 1e-9  #: Speed [m/s] that stands in for none where one divides by it
 
 
 @dataclass(frozen=True, slots=True)
@@ -310,7 +276,7 @@ def level_friction(g: Ground, friction: float, least: float) -> float:
 
 
 @subroutine
-def haste(g: Ground, friction: float, delay: float, velocity: Array3) -> float:
+def haste(g: Ground, c: RoughConfig, friction: float, delay: float, velocity: Array3) -> float:
     """Share of the greatest acceleration that the robot is given.
 
     By the ``friction`` and slope of the ground, by how late the commands act [s], and by the
@@ -321,6 +287,8 @@ def haste(g: Ground, friction: float, delay: float, velocity: Array3) -> float:
     share = min(share, 1.0 - (1.0 - LATE_HASTE) * late)
     fast = min(max((np.hypot(velocity[0], velocity[1]) - QUICK) / (FAST - QUICK), 0.0), 1.0)
     share = min(share, 1.0 - (1.0 - FAST_HASTE) * fast)
+    if np.hypot(velocity[0], velocity[1]) > TOO_FAST * greatest_speed(g, c):
+        return min(ROUGH_BRAKE, share)
     return ROUGH_HASTE * share if is_rough(g) else share
 
 
@@ -426,75 +394,3 @@ def learn_ground(
 def note_stumble(g: Ground) -> None:
     """Take in that a foot was stopped in its swing."""
     g.roughness, g.rise_way = max(g.roughness, STUMBLE), FIRST_WAY
-
-
-class Slip(Record):
-    """What the feet have shown."""
-
-    friction: float  #: the estimate
-    has_slid: bool
-    """Whether a foot has, and has shown less than the greatest estimate, since that was the
-    estimate."""
-    loaded: Float[np.ndarray, "4"]  #: time [s] for which each foot has stood
-    sliding: Float[np.ndarray, "4"]  #: time [s] for which it has slid
-
-
-@subroutine
-def exerted_ratio(now: Snapshot, tau: Foreign[Float[np.ndarray, "12"]], leg: int) -> float:
-    """Force of a foot along the ground over that into it, as the torques of its leg make it.
-
-    ``J' f = h - tau`` of the leg's own joints, whose accelerations are left out. Cramer's rule
-    gives f up to the determinant, of which a ratio needs only the sign, so that a straight leg does
-    no harm. Huge for a foot that does not press on the ground.
-    """
-    J, first, h = now.J_contacts[leg], 6 + 3 * leg, now.bias
-    x = J[0, first], J[1, first], J[2, first]
-    y = J[0, first + 1], J[1, first + 1], J[2, first + 1]
-    z = J[0, first + 2], J[1, first + 2], J[2, first + 2]
-    f = plus_scaled((0.0, 0.0, 0.0), h[first] - tau[3 * leg], cross(y, z))
-    f = plus_scaled(f, h[first + 1] - tau[3 * leg + 1], cross(z, x))
-    f = plus_scaled(f, h[first + 2] - tau[3 * leg + 2], cross(x, y))
-    return np.hypot(f[0], f[1]) / max(f[2] * np.sign(dot(x, cross(y, z))), _TINY)
-
-
-@subroutine
-def observe_slip(
-    slip: Slip,
-    now: Snapshot,
-    contact: Foreign[Bool[np.ndarray, "4"]],
-    tau: Foreign[Float[np.ndarray, "12"]],
-    stance: Bool[np.ndarray, "4"],
-    is_stepping: bool,
-    stands_beside_com: bool,
-    dt: float,
-) -> None:
-    """Look at the feet that shall stand, ``dt`` seconds after the last look.
-
-    ``contact`` are the feet in measured contact, ``tau`` [N m] the measured torques.
-    """
-    if stands_beside_com and not slip.has_slid:
-        slip.friction = MOST_FRICTION
-    slips, shown = False, MOST_FRICTION
-    for leg in range(4):
-        v_x, v_y, v_z = triple(now.v_world_contacts[leg])
-        speed = np.hypot(v_x, v_y)
-        is_level = abs(v_z) <= MOST_STEEPNESS * speed
-        loaded = slip.loaded[leg] + dt
-        if not contact[leg]:
-            loaded = max(min(loaded, 2.0 * TOUCHDOWN_MASK) - 2.0 * dt, 0.0)
-        slip.loaded[leg] = loaded if stance[leg] else 0.0
-        may_slide = slip.loaded[leg] > TOUCHDOWN_MASK
-        slides = may_slide and contact[leg] and speed > SLIP_SPEED and is_level
-        if contact[leg] or not may_slide:
-            slip.sliding[leg] = slip.sliding[leg] + dt if slides else 0.0
-        if slides and slip.sliding[leg] > SLIP_PATIENCE:
-            slips = True
-            ratio = exerted_ratio(now, tau, leg)
-            shown = min(shown, ratio / (1.0 + speed / HALF_SPEED))
-    if slips:
-        slip.has_slid = slip.has_slid or shown < MOST_FRICTION
-        fall = min(max(shown, LEAST_FRICTION) - slip.friction, 0.0)
-        slip.friction += fall * min(dt / FRICTION_FALL_TIME, 1.0)
-    elif is_stepping:
-        slip.friction = min(slip.friction + FRICTION_RISE * dt, MOST_FRICTION)
-        slip.has_slid = slip.has_slid and slip.friction < MOST_FRICTION

@@ -26,9 +26,6 @@ from go2_wbc.planning.force_mpc import apply_force_plan
 from go2_wbc.planning.gait_clock import adapt, foot_phase, pace, restart
 from go2_wbc.planning.ground import (
     LATE,
-    LEAST_FRICTION,
-    MOST_FRICTION,
-    Slip,
     carry_ground,
     expect_steps,
     greatest_speed,
@@ -41,7 +38,6 @@ from go2_wbc.planning.ground import (
     learn_ground,
     level_friction,
     note_stumble,
-    observe_slip,
     on_leash,
     slow_down,
 )
@@ -57,6 +53,7 @@ from go2_wbc.planning.rest import (
 )
 from go2_wbc.planning.sight import look, steps_by_sight
 from go2_wbc.planning.sighted_steps import height_to_land, swing_by_sight
+from go2_wbc.planning.slip import LEAST_FRICTION, MOST_FRICTION, Slip, observe_slip
 from go2_wbc.planning.swing import (
     FootContact,
     Swing,
@@ -177,7 +174,8 @@ def integrate(now: Snapshot, s: Planner, c: Walk, command: Command, dt: float) -
     advance_pose(trunk.pose, trunk.pose_rate, config.pose, command.pose, dt)
     if s.clock.is_waiting:
         give_way(trunk, now)
-    linear = haste(s.ground, s.slip.friction, s.delay, trunk.velocity) * config.linear_acceleration
+    share = haste(s.ground, config.rough, s.slip.friction, s.delay, trunk.velocity)
+    linear = share * config.linear_acceleration
     accelerate(trunk, command, linear, config.angular_acceleration, dt)
     follow_heading(trunk, now, config.yaw_leash, dt)
     if s.is_stepping:

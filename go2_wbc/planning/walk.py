@@ -12,11 +12,12 @@ from go2_wbc.brief import brief
 from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ConfigError
-from go2_wbc.planning import ground, swing
+from go2_wbc.planning import ground, slip, swing
 from go2_wbc.planning.gait_clock import Cadence, Clock
-from go2_wbc.planning.ground import Ground, RoughConfig, Slip
+from go2_wbc.planning.ground import Ground, RoughConfig
 from go2_wbc.planning.mpc import Horizon, MpcConfig
 from go2_wbc.planning.sight import Sight
+from go2_wbc.planning.slip import Slip
 from go2_wbc.planning.swing import FootContact, Step, Swing, SwingConfig
 from go2_wbc.planning.trunk import PoseConfig, Trunk
 from go2_wbc.records import Array4, Record
@@ -44,15 +45,15 @@ LEAST_HEIGHT, GREATEST_HEIGHT = 0.18, 0.34  #: CoM heights [m] between which the
     ),
     slip=past_table(
         "slip",
-        speed=ground.SLIP_SPEED,
-        patience=ground.SLIP_PATIENCE,
-        mask=ground.TOUCHDOWN_MASK,
-        steepness=ground.MOST_STEEPNESS,
-        time_constant=ground.FRICTION_FALL_TIME,
-        recovery=ground.FRICTION_RISE,
-        least=ground.LEAST_FRICTION,
-        most=ground.MOST_FRICTION,
-        half_speed=ground.HALF_SPEED,
+        speed=slip.SLIP_SPEED,
+        patience=slip.SLIP_PATIENCE,
+        mask=slip.TOUCHDOWN_MASK,
+        steepness=slip.MOST_STEEPNESS,
+        time_constant=slip.FRICTION_FALL_TIME,
+        recovery=slip.FRICTION_RISE,
+        least=slip.LEAST_FRICTION,
+        most=slip.MOST_FRICTION,
+        half_speed=slip.HALF_SPEED,
     ),
 )
 @ranged(

@@ -10,7 +10,7 @@ from controller.navigation import DriveStraight, Goal, TurnInPlace
 from go2_wbc.contacts import GAITS
 from go2_wbc.errors import DynamicMotionRefused, ModeError, StanceMismatch
 from go2_wbc.planning.command import ZERO_COMMAND
-from go2_wbc.planning.ground import MOST_FRICTION
+from go2_wbc.planning.slip import MOST_FRICTION
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline, load_motion

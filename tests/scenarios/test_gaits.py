@@ -17,8 +17,8 @@ from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.envelopes import DWELL, envelope_of
 from go2_wbc.planning.gait_clock import time_between
-from go2_wbc.planning.ground import MOST_FRICTION
 from go2_wbc.planning.locomotion import LocomotionConfig
+from go2_wbc.planning.slip import MOST_FRICTION
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 

@@ -1,6 +1,4 @@
-"""The ground below a walking robot: its plane, how rough it is, and its friction."""
-
-from dataclasses import replace
+"""The ground below a walking robot: its plane, how rough it is, and what it permits."""
 
 import numpy as np
 import pytest
@@ -16,9 +14,7 @@ from go2_wbc.planning.ground import (
     FIRST_RAISED,
     FIRST_WAY,
     FORGETS,
-    FRICTION_RISE,
     GROUND_SHARE,
-    HALF_SPEED,
     HASTE_FRICTION,
     HIGH,
     LATE,
@@ -26,30 +22,26 @@ from go2_wbc.planning.ground import (
     LATE_HASTE,
     LATE_SPEED,
     LEAN_RATE,
-    LEAST_FRICTION,
     LIFT_RATE,
     MEMORY,
-    MOST_FRICTION,
     MOST_RAISE,
     MOST_SLOPE,
     PROMPT,
     QUICK,
     ROUGH,
+    ROUGH_BRAKE,
     ROUGH_HASTE,
-    SLIP_SPEED,
     SMOOTH,
     STEEP,
     STEEP_FORGETS,
     STUMBLE,
-    TOUCHDOWN_MASK,
+    TOO_FAST,
     Ground,
     RoughConfig,
-    Slip,
     apex_raise,
     carry_ground,
     delay,
     earliness,
-    exerted_ratio,
     expect_steps,
     ground_at,
     ground_below,
@@ -59,10 +51,10 @@ from go2_wbc.planning.ground import (
     learn_ground,
     level_friction,
     note_stumble,
-    observe_slip,
     slow_down,
     tilt,
 )
+from go2_wbc.planning.slip import MOST_FRICTION
 from go2_wbc.robot.state import Snapshot
 from tests import engine_helpers as helpers
 
@@ -72,9 +64,6 @@ SLOPE = np.array([0.2, -0.1])
 EXACT = 1e-12
 TICK = 0.002
 SLOW = np.array([0.0, QUICK, 6.0])  # as fast as it may be without being fast
-STANCE = np.ones(4, dtype=bool)
-PRESSURE = 40.0  # N on each foot
-ROUNDING = 1e-9
 
 
 def on_plane(slope: np.ndarray, height: float = 0.4) -> Snapshot:
@@ -161,13 +150,26 @@ def test_on_rough_ground_no_foot_is_led_above_the_highest_that_was_met() -> None
 
 def test_the_robot_speeds_up_as_ground_and_motors_bear_it() -> None:
     level, slope = plane(on_plane(np.zeros(2))), plane(on_plane(SLOPE))
-    assert haste(level, MOST_FRICTION, PROMPT, SLOW) == 1.0
-    assert haste(level, MOST_FRICTION, 2.0 * LATE, SLOW) == pytest.approx(LATE_HASTE)
-    assert haste(level, 0.5 * HASTE_FRICTION, LATE, SLOW) == pytest.approx(0.25)
-    assert haste(slope, HASTE_FRICTION, 0.0, SLOW) < 1.0
-    assert haste(level, MOST_FRICTION, 0.0, FAST / QUICK * SLOW) == pytest.approx(FAST_HASTE)
+    assert haste(level, CONFIG, MOST_FRICTION, PROMPT, SLOW) == 1.0
+    assert haste(level, CONFIG, MOST_FRICTION, 2.0 * LATE, SLOW) == pytest.approx(LATE_HASTE)
+    assert haste(level, CONFIG, 0.5 * HASTE_FRICTION, LATE, SLOW) == pytest.approx(0.25)
+    assert haste(slope, CONFIG, HASTE_FRICTION, 0.0, SLOW) < 1.0
+    assert haste(level, CONFIG, MOST_FRICTION, 0.0, FAST / QUICK * SLOW) == pytest.approx(
+        FAST_HASTE
+    )
+
+
+def test_on_rough_ground_the_robot_brakes_harder_than_it_speeds_up_also_on_low_friction() -> None:
+    level, asked = plane(on_plane(np.zeros(2))), np.array([TOO_FAST * CONFIG.speed, 0.0, 9.0])
     level.rough_way = 0.1
-    assert haste(level, MOST_FRICTION, 0.0, SLOW) == pytest.approx(ROUGH_HASTE)
+    low = 0.5 * HASTE_FRICTION
+    assert haste(level, CONFIG, MOST_FRICTION, 0.0, asked) == pytest.approx(ROUGH_HASTE)
+    assert haste(level, CONFIG, low, 0.0, asked) == pytest.approx(0.25 * ROUGH_HASTE)
+    assert haste(level, CONFIG, MOST_FRICTION, 0.0, 1.01 * asked) == ROUGH_BRAKE
+    assert haste(level, CONFIG, low, 0.0, 1.01 * asked) == pytest.approx(0.25)
+    level.high_way = 0.1
+    slower = CONFIG.high_speed / CONFIG.speed * asked
+    assert haste(level, CONFIG, MOST_FRICTION, 0.0, 1.01 * slower) == ROUGH_BRAKE
 
 
 def test_where_commands_act_late_the_robot_walks_slower() -> None:
@@ -187,8 +189,8 @@ def test_feet_that_are_foretold_below_the_ground_make_it_no_rougher() -> None:
     here = on_plane(np.zeros(2)).replaced(p_world_feet=feet, v_world_contacts=down)
     for late, low in ((0.0, 0.028), (PROMPT, 0.028), (PROMPT + 0.01, 0.008), (0.02, 0.0)):
         ground = plane(on_plane(np.zeros(2)))
-        learn_ground(ground, here, MODEL.foot_radius, STANCE, late)
-        assert ground.roughness == pytest.approx(low, abs=ROUNDING)
+        learn_ground(ground, here, MODEL.foot_radius, np.ones(4, dtype=bool), late)
+        assert ground.roughness == pytest.approx(low, abs=1e-9)
         assert ground.height == pytest.approx(0.4 - GROUND_SHARE * low)
 
 
@@ -289,130 +291,3 @@ def test_the_trunk_is_carried_for_the_next_step_up_until_the_ground_falls_or_a_w
     note_stumble(ground)
     ground.slope[0] = 0.5 * STEEP
     assert carried(0.5)[0] == pytest.approx(0.5 * FIRST_LIFT), "as far as it is level"
-
-
-def sliding(
-    speed: float, rise: float = 0.0, ratio: float = 0.0, *, touches: bool = True
-) -> Snapshot:
-    """The front left foot slides sideways; all push with ``ratio`` times what presses on them."""
-    snapshot = MODEL.snapshot(helpers.state_of(helpers.standing_q()))
-    v = np.zeros((4, 3))
-    v[0] = [0.0, speed, rise]
-    force = np.tile([0.6 * ratio * PRESSURE, -0.8 * ratio * PRESSURE, PRESSURE], (4, 1))
-    tau = snapshot.bias - np.einsum("lij,li->j", snapshot.J_contacts, force)
-    state = replace(snapshot.state, tau=tau[6:], feet_in_contact=np.full(4, touches))
-    return snapshot.replaced(state=state, v_world_contacts=v)
-
-
-def look(slip: Slip, snapshot: Snapshot, *, steps: bool = True, beside: bool = False) -> None:
-    state = snapshot.state
-    observe_slip(slip, snapshot, state.feet_in_contact, state.tau, STANCE, steps, beside, TICK)
-
-
-def after(snapshot: Snapshot, seconds: float) -> Slip:
-    slip = Slip(friction=MOST_FRICTION)
-    for _ in range(round(seconds / TICK)):
-        look(slip, snapshot)
-    return slip
-
-
-def test_a_foot_that_slides_lowers_the_friction_to_the_least() -> None:
-    assert after(sliding(0.3), 0.1).friction < 0.2
-    assert LEAST_FRICTION <= after(sliding(0.3), 1.0).friction < LEAST_FRICTION + 1e-3
-
-
-@pytest.mark.parametrize("ratio", [0.0, 0.3, 1.4])
-def test_the_ratio_is_that_of_the_forces_that_the_torques_make(ratio: float) -> None:
-    snapshot = sliding(0.0, ratio=ratio)
-    for leg in range(4):
-        found = exerted_ratio(snapshot, snapshot.state.tau, leg)
-        assert found == pytest.approx(ratio, abs=ROUNDING)
-
-
-def test_the_friction_falls_to_what_the_foot_shows_and_no_further() -> None:
-    shown = 0.4 / (1.0 + 0.2 / HALF_SPEED)
-    assert after(sliding(0.2, ratio=0.4), 1.0).friction == pytest.approx(shown, abs=1e-6)
-
-
-def test_a_foot_that_slides_under_a_great_force_leaves_it() -> None:
-    """The trot fell at pushes, for want of the force that its overloaded feet still gave."""
-    assert after(sliding(0.15, ratio=0.9), 0.2).friction == MOST_FRICTION
-
-
-def test_the_foot_that_shows_least_counts() -> None:
-    snapshot = sliding(0.2, ratio=0.4)
-    v = np.tile(snapshot.v_world_contacts[0], (4, 1))
-    tau = snapshot.state.tau.copy()
-    tau[:3] = sliding(0.2, ratio=0.1).state.tau[:3]
-    both = snapshot.replaced(state=replace(snapshot.state, tau=tau), v_world_contacts=v)
-    assert after(both, 1.0).friction == pytest.approx(LEAST_FRICTION, abs=1e-6)
-
-
-def test_a_foot_that_does_not_press_on_the_ground_leaves_it() -> None:
-    snapshot = sliding(0.3, ratio=0.2)
-    lifts = replace(snapshot.state, tau=2 * snapshot.bias[6:] - snapshot.state.tau)
-    assert after(snapshot.replaced(state=lifts), 0.2).friction == MOST_FRICTION
-
-
-@pytest.mark.parametrize(
-    "snapshot",
-    [sliding(0.9 * SLIP_SPEED), sliding(0.3, touches=False), sliding(0.3, 0.3)],
-    ids=["slow", "in the air", "off an edge"],
-)
-def test_a_foot_that_does_not_slide_on_the_ground_leaves_it(snapshot: Snapshot) -> None:
-    assert after(snapshot, 0.2).friction == MOST_FRICTION
-
-
-def test_a_foot_may_slide_just_after_touchdown() -> None:
-    assert after(sliding(0.3), TOUCHDOWN_MASK).friction == MOST_FRICTION
-
-
-def test_a_foot_that_chatters_while_it_slides_has_not_come_down_anew() -> None:
-    """On sensors the trot fell on a friction of 0.2: the estimate stayed at 0.44."""
-    slip, slides = Slip(friction=MOST_FRICTION), sliding(0.3)
-    for tick in range(100):
-        is_lost = tick > 15 and tick % 8 >= 5
-        look(slip, sliding(0.3, touches=False) if is_lost else slides)
-    assert slip.friction < 0.2
-
-
-def test_a_foot_that_was_off_for_long_comes_down_anew() -> None:
-    slip, slides = Slip(friction=MOST_FRICTION), sliding(0.3)
-    for _ in range(round(TOUCHDOWN_MASK / TICK)):
-        look(slip, slides)
-    for _ in range(round(2.0 * TOUCHDOWN_MASK / TICK)):
-        look(slip, sliding(0.3, touches=False))
-    for _ in range(round(TOUCHDOWN_MASK / TICK)):
-        look(slip, slides)
-    assert slip.friction == MOST_FRICTION
-
-
-def test_the_friction_comes_back_slowly() -> None:
-    slip = after(sliding(0.3), 0.2)
-    low = slip.friction
-    for _ in range(500):
-        look(slip, sliding(0.0))
-    assert slip.friction == pytest.approx(low + FRICTION_RISE, abs=1e-6)
-
-
-def test_a_gait_beside_the_com_counts_on_the_ground_until_a_foot_has_slid() -> None:
-    """With 0.2 a bound that turned at once fell in 15 of 16 runs, with this in none."""
-    slip, holds = Slip(friction=0.2), sliding(0.0)
-    look(slip, holds)
-    assert slip.friction == pytest.approx(0.2, abs=0.01)
-    look(slip, holds, beside=True)
-    assert slip.friction == MOST_FRICTION
-    slip = after(sliding(0.3), 0.2)
-    look(slip, holds, beside=True)
-    assert slip.has_slid
-    assert slip.friction < 0.2
-    slip.friction = MOST_FRICTION
-    look(slip, holds)
-    assert not slip.has_slid
-
-
-def test_a_robot_that_only_stands_shows_nothing_of_the_friction() -> None:
-    slip = Slip(friction=0.2)
-    for _ in range(500):
-        look(slip, sliding(0.0), steps=False)
-    assert slip.friction == 0.2

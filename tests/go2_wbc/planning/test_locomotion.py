@@ -9,8 +9,9 @@ import pytest
 from go2_wbc.contacts import GAITS, Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.footholds import LEAST_GAP
-from go2_wbc.planning.ground import EASE, GROUND_SHARE, LEASH, MOST_FRICTION
+from go2_wbc.planning.ground import EASE, GROUND_SHARE, LEASH
 from go2_wbc.planning.locomotion import HURRY, LocomotionPlanner
+from go2_wbc.planning.slip import MOST_FRICTION
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.rotations import log_rotation, yaw_rotation
 from go2_wbc.robot.state import Snapshot
