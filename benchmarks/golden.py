@@ -5,13 +5,10 @@ tick a digest of what each stage made is kept, and of some the numbers, so that 
 told. Records hold for the machine that made them: another processor may round in another way.
 """
 
-import logging
 import pickle
 import zlib
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import closing
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated
@@ -22,6 +19,7 @@ import numpy as np
 from benchmarks.command import positive
 from benchmarks.golden_runs import KEPT_EVERY, RUNS, STAGES, Ledger, Values
 from controller.cli.common import ExitCode, ProgressLine
+from controller.sweeps.engine import LocalEngine
 from go2_wbc.errors import CommandError, ConfigError, unknown_name
 from go2_wbc.files import checked_output
 
@@ -104,31 +102,6 @@ def replay(name: str, folder: Path) -> Ledger:
     return ledger
 
 
-def work_on(name: str, act: str, folder: Path, tolerance: float) -> str | None:
-    """Run it and write it, or tell how it differs from what was written."""
-    file = folder / f"{name}.pickle"
-    if act == COMPARE:
-        return difference(read(file), replay(name, folder), tolerance)
-    file.with_suffix(".npy").unlink(missing_ok=True)
-    written(replay(name, folder), file)
-    return None
-
-
-def results(
-    work: Callable[[str], str | None], names: Sequence[str], workers: int
-) -> Iterator[tuple[str, str | None]]:
-    """What ``work`` gives for each run, as they end."""
-    if workers == 1:
-        yield from ((name, work(name)) for name in names)
-        return
-    with ProcessPoolExecutor(
-        workers, get_context("spawn"), initializer=logging.disable, initargs=(logging.WARNING,)
-    ) as pool:
-        futures = {pool.submit(work, name): name for name in names}
-        for future in as_completed(futures):
-            yield futures[future], future.result()
-
-
 def run(
     act: Annotated[str, "write the runs, or check them", (RECORD, COMPARE)],
     folder: Annotated[Path, "FOLDER", "where the runs are kept"],
@@ -152,14 +125,22 @@ def run(
     for name in names:
         if name not in RUNS:
             raise CommandError(unknown_name("run", name, RUNS))
+    files = {name: folder / f"{name}.pickle" for name in names}
+    before = {name: read(file) for name, file in files.items()} if act == COMPARE else {}
     if act == RECORD:
-        checked_output(folder / "run.pickle", (".pickle",))
-    work = partial(work_on, act=act, folder=folder, tolerance=tolerance)
+        for file in files.values():
+            checked_output(file, (file.suffix,)).with_suffix(".npy").unlink(missing_ok=True)
     is_equal, good = True, "recorded" if act == RECORD else "equal"
-    with ProgressLine() as line:
+    ends = LocalEngine(workers).run(partial(replay, folder=folder), names)
+    with ProgressLine() as line, closing(ends):
         line.update(0.0, act)
-        for number, (name, told) in enumerate(results(work, names, workers), 1):
+        for number, ended in enumerate(ends, 1):
+            if ended.failure is not None:
+                raise RuntimeError(f"{ended.item}: {ended.failure.text}\n{ended.failure.details}")
+            if act == RECORD:
+                written(ended.value, files[ended.item])
+            told = difference(before[ended.item], ended.value, tolerance) if before else None
             is_equal &= told is None
-            line.update(number / len(names), name)
-            print(f"{name:<16}{told or good}", flush=True)
+            line.update(number / len(names), ended.item)
+            print(f"{ended.item:<16}{told or good}", flush=True)
     return ExitCode.OK if is_equal else ExitCode.FAILED

@@ -24,7 +24,7 @@ from jaxtyping import Float32
 from benchmarks import speed_solves, speed_ticks
 from benchmarks.command import ROOT, Benchmark
 from benchmarks.robots import checker
-from benchmarks.speed_ticks import timed
+from benchmarks.speed_solves import timed
 from benchmarks.study import Study, TrialResult
 from controller.learning import ENVIRONMENTS, Go2Env, Go2VectorEnv, read_dataset, record
 from controller.observation import ACTIONS, RATE

@@ -6,6 +6,7 @@ from contextlib import closing
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from benchmarks.speed_placo import BarePlaco
 from benchmarks.study import TrialResult
@@ -113,20 +114,22 @@ def _explaining(wbc: WholeBodyController, ticks: Sequence[Tick]) -> dict[str, fl
     solutions = [wbc.solve(tick.snapshot, tick.reference) for tick in ticks]
     for tick in ticks:
         telemetry.record(tick.snapshot, tick.reference.stance, "")
-    rounds = {"noted": list[float](), "explained": list[float]()}
-    for _ in range(BATCHES):
-        for name, act, many in (
-            ("noted", telemetry.note, solutions),
-            ("explained", WbcSolution.explain, solutions[::BATCHES]),
-        ):
-            start = time.thread_time_ns()
-            for solution in many:
-                act(solution)
-            rounds[name].append((time.thread_time_ns() - start) / 1e3 / len(many) / slow)
-    return {
-        "noted": float(np.median(rounds["noted"])),
-        "explained": float(np.median(rounds["explained"])) / 1e3,
-    }
+
+    def spent(act: Callable[[WbcSolution], object], many: Sequence[WbcSolution]) -> float:
+        rounds = timed(lambda: [act(solution) for solution in many], BATCHES)
+        return float(np.median(rounds)) / len(many) / slow
+
+    explained = spent(WbcSolution.explain, solutions[::BATCHES]) / 1e3
+    return {"noted": spent(telemetry.note, solutions), "explained": explained}
+
+
+def timed(work: Callable[[], object], times: int) -> Float[np.ndarray, " n"]:
+    """Processor time [us] from the end of each call to the end of the next."""
+    ends = [time.thread_time_ns()]
+    for _ in range(times):
+        work()
+        ends.append(time.thread_time_ns())
+    return np.diff(ends) / 1e3
 
 
 def interleaved(

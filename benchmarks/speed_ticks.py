@@ -12,9 +12,8 @@ from contextlib import closing, contextmanager
 from functools import partial
 
 import numpy as np
-from jaxtyping import Float
 
-from benchmarks.speed_solves import recorded_ticks, slowness
+from benchmarks.speed_solves import recorded_ticks, slowness, timed
 from benchmarks.study import TrialResult
 from controller.go2_controller import GO2Controller
 from controller.pacing import Pacer
@@ -291,15 +290,6 @@ def bare_work(duration: float) -> Callable[[], object]:
     durations = timed(partial(hashlib.sha256, sample), CALIBRATION_CALLS)
     size = max(1, round(len(sample) * duration / float(np.median(durations))))
     return partial(hashlib.sha256, bytes(size))
-
-
-def timed(work: Callable[[], object], times: int) -> Float[np.ndarray, " n"]:
-    """Processor time [us] from the end of each call to the end of the next."""
-    ends = [time.thread_time_ns()]
-    for _ in range(times):
-        work()
-        ends.append(time.thread_time_ns())
-    return np.diff(ends) / 1e3
 
 
 def share_late(work: Callable[[], object], period: float) -> float:

@@ -1,6 +1,7 @@
 """Golden runs: what is equal, what is told of a difference, and that each stage is looked at."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -17,8 +18,14 @@ from go2_wbc.config import Config
 from go2_wbc.errors import ConfigError
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.state import JointCommand
+from tests.benchmarks.conftest import Here
 
-ONE = ("--workers", "1")
+
+@pytest.fixture(autouse=True, scope="module")
+def _one_process() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(golden, "LocalEngine", lambda _workers: Here())
+        yield
 
 
 def wait(go2: GO2Controller) -> None:
@@ -35,7 +42,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("golden")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(golden, "RUNS", runs(Config()))
-        assert main(["golden", "record", str(folder), *ONE]) == ExitCode.OK
+        assert main(["golden", "record", str(folder)]) == ExitCode.OK
     return folder
 
 
@@ -43,7 +50,7 @@ def compared(
     folder: Path, patch: pytest.MonkeyPatch, config: Config | None = None, *options: str
 ) -> int:
     patch.setattr(golden, "RUNS", runs(config or Config()))
-    return main(["golden", "compare", str(folder), *ONE, *options])
+    return main(["golden", "compare", str(folder), *options])
 
 
 def heavier() -> Config:
@@ -149,7 +156,7 @@ def test_readings_of_the_sensors_are_kept_with_the_record(
     short = RobotRun(steps, partial(MujocoPlant, sensors="imu"))
     monkeypatch.setattr(golden_runs, "RobotRun", lambda *_: short)
     monkeypatch.setattr(golden, "RUNS", {"estimator": RUNS["estimator"]})
-    assert main(["golden", "record", str(tmp_path), *ONE]) == ExitCode.OK
+    assert main(["golden", "record", str(tmp_path)]) == ExitCode.OK
     rows = np.load(tmp_path / "estimator.npy")
     np.save(tmp_path / "estimator.npy", rows[:-1])
-    assert main(["golden", "compare", str(tmp_path), *ONE]) == ExitCode.FAILED
+    assert main(["golden", "compare", str(tmp_path)]) == ExitCode.FAILED
