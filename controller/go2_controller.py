@@ -24,7 +24,7 @@ from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ClosedError, CommandError, Go2WbcError, ModeError, TimelineError
 from go2_wbc.motion_plan import MotionPlan
-from go2_wbc.planning.command import VelocityCommand, finite_number
+from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.trunk import BodyPose
 from go2_wbc.plant import MujocoPlant, Plant
 from go2_wbc.recording import Recording
@@ -225,8 +225,7 @@ class GO2Controller:
         Raises:
             CommandError: as ``turn_left``.
         """
-        angle = finite_number("angle", angle)
-        return self._call("turn_right", lambda: self._pilot.run_goal(TurnInPlace(-angle)))
+        return self._call("turn_right", lambda: self._pilot.run_goal(TurnInPlace(angle, -1.0)))
 
     def move_forward(self, distance: float) -> bool:
         """Walk ``distance`` [m] straight ahead, measured; negative is backward.

@@ -78,14 +78,16 @@ class Goal(ABC):
 class TurnInPlace(Goal):
     """Turn left by an angle, staying in place."""
 
-    def __init__(self, angle: float) -> None:
-        """Turn by ``angle`` [rad], negative turns right; CommandError beyond ``GREATEST_TURN``."""
-        if abs(finite_number("angle", angle)) > GREATEST_TURN:
+    def __init__(self, angle: float, way: float = 1.0) -> None:
+        """Turn left by ``way`` times ``angle`` [rad]; CommandError beyond ``GREATEST_TURN``."""
+        angle = finite_number("angle", angle)
+        if abs(angle) > GREATEST_TURN:
             raise CommandError(
                 f"angle of {angle:g} rad looks like degrees: write deg({angle:g}), from motions "
                 f"import deg; a turn goes to 360 deg at most, and this is {math.degrees(angle):.0f}"
             )
-        super().__init__(f"turn by {math.degrees(angle):.1f} deg", angle, TURN_RATE)
+        asked = way * angle
+        super().__init__(f"turn by {math.degrees(asked):.1f} deg", asked, TURN_RATE)
 
     def _velocity(self, ahead: float, left: float, turned: float) -> tuple[float, float, float]:
         turn = _clipped(APPROACH * (self._asked - turned), TURN_RATE)
@@ -111,7 +113,8 @@ class DriveStraight(Goal):
 
     def __init__(self, distance: float) -> None:
         """Walk ``distance`` [m], negative goes back; CommandError beyond ``GREATEST_DISTANCE``."""
-        if abs(finite_number("distance", distance)) > GREATEST_DISTANCE:
+        distance = finite_number("distance", distance)
+        if abs(distance) > GREATEST_DISTANCE:
             limit = f"+-{GREATEST_DISTANCE:.0f} m"
             raise CommandError(f"distance must be within {limit}, got {distance}")
         super().__init__(f"walk {distance:.3f} m", distance, WALK_SPEED)

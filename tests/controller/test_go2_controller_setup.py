@@ -199,7 +199,7 @@ def test_degrees_are_asked_back_wherever_an_angle_is_taken(way: str, lying: GO2C
         (lambda go2: go2.high_five(hold=0.4), "hold must be 0.5 to 30 s, got 0.4"),
         (lambda go2: go2.high_five(hold=31.0), "hold must be 0.5 to 30 s, got 31.0"),
         (lambda go2: go2.wait(-0.1), r"seconds must be from 0 to 1e\+06 s, got -0.1"),
-        (lambda go2: go2.turn_right(6.3), "-6.3 rad looks like degrees: write deg"),
+        (lambda go2: go2.turn_right(90), r"^angle of 90 rad .* write deg\(90\)"),
         (lambda go2: go2.move_forward(1e9), r"distance must be within \+-100 m, got 1"),
         (lambda go2: go2.high_five("up"), "unknown side 'up'; valid: left, right"),
         (lambda go2: go2.walk("canter"), "unknown gait 'canter'; valid: .*trot"),
@@ -261,3 +261,16 @@ def test_what_are_no_tasks_is_refused_by_an_error_of_our_own(tmp_path: Path) -> 
     # In a process of its own: under pytest the run-time type checks would refuse them first.
     done = run_python(WRONG_TASKS, tmp_path)
     assert done.returncode == 0, done.stderr
+
+
+FRACTIONS = """
+from fractions import Fraction
+from controller.navigation import DriveStraight, TurnInPlace
+
+print(DriveStraight(Fraction(1, 3)).name, TurnInPlace(Fraction(1, 3), -1.0).name, sep=", ")
+"""
+
+
+def test_a_fraction_is_a_distance_and_an_angle(tmp_path: Path) -> None:
+    # Again without the run-time type checks. It ended in a TypeError, and the robot went limp.
+    assert run_python(FRACTIONS, tmp_path).stdout == "walk 0.333 m, turn by -19.1 deg\n"

@@ -152,7 +152,7 @@ class GO2ControllerNode(ros.Node):
 
     def turn_right(self, angle: float) -> bool:
         """Turn right in place by ``angle`` [rad], closed on odometry."""
-        return self._run_goal(TurnInPlace(-finite_number("angle", angle)))
+        return self._run_goal(TurnInPlace(angle, -1.0))
 
     def move_forward(self, distance: float) -> bool:
         """Walk ``distance`` [m] straight ahead, closed on odometry; negative is backward."""
