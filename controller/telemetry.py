@@ -154,7 +154,7 @@ class Telemetry:
         Raises:
             CommandError: if ``rate`` is not a positive number.
         """
-        if not (is_finite_number(rate) and 0.0 < rate <= LARGEST):
+        if not (is_finite_number(rate) and 0.0 < float(rate) <= LARGEST):
             raise CommandError(f"rate must be positive, got {rate!r:.80}")
         order = np.arange(max(0, self._count - self._capacity), self._count)
         rows = order % self._capacity

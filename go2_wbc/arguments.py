@@ -10,6 +10,7 @@ is valid.
 from __future__ import annotations
 
 import inspect
+import os
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import InitVar
@@ -26,6 +27,7 @@ from go2_wbc.validation import LARGEST, is_finite_number
 
 _Item = TypeVar("_Item", bound=Callable[..., Any])
 _MOST = 2**63  #: Whole numbers are smaller: those of a file of a sweep, and of NumPy's arrays
+_LONGEST_NAME = 255  #: Of a file [bytes]; most file systems have this limit
 _FUNCTION = typing.get_origin(Callable[..., Any])
 _Parameter = inspect.Parameter
 _UNIONS = (UnionType, typing.Union)
@@ -134,6 +136,8 @@ def _parts(kind: object) -> tuple[Any, tuple[Any, ...]]:
 def _fits(value: object, kind: object) -> bool:
     origin, parts = _parts(kind)
     if origin in _UNIONS:
+        if isinstance(value, str) and Path in parts:
+            return _fits(value, Path)
         return any(_fits(value, part) for part in parts)
     if origin is float:
         return is_finite_number(value) and abs(value) <= LARGEST
@@ -146,11 +150,17 @@ def _fits(value: object, kind: object) -> bool:
     if origin is _FUNCTION:
         return callable(value)
     if origin is Path:
-        return isinstance(value, Path | str)
+        return isinstance(value, Path | str) and _is_possible(value)
     is_class = isinstance(origin, type) and origin not in (Any, object)
     if not is_class or getattr(origin, "_is_protocol", False):
         return True
     return _is_collection(value, origin, parts) if parts else isinstance(value, origin)
+
+
+def _is_possible(path: Path | str) -> bool:
+    """Whether a file can have this path."""
+    names = os.fsencode(path).split(b"/")
+    return b"\0" not in b"".join(names) and max(map(len, names)) <= _LONGEST_NAME
 
 
 def _is_collection(value: object, origin: type, parts: tuple[Any, ...]) -> bool:
@@ -209,6 +219,6 @@ _WORDS: dict[object, str] = {
     bool: "True or False",
     str: "a text",
     NoneType: "None",
-    Path: "a path",
+    Path: "a path that a file can have",
     _FUNCTION: "a function",
 }

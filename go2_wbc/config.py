@@ -110,7 +110,7 @@ def load_config(path: Path | str) -> Config:
         ConfigError: if the file cannot be read, names an unknown key, or has a wrong value.
     """
     try:
-        overrides = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        overrides = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise ConfigError(f"cannot read the configuration {path}: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

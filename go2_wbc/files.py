@@ -46,8 +46,9 @@ def write_atomically(target: Path, content: bytes) -> Path:
     Raises:
         ConfigError: if the disk refuses; an older file of this name is then untouched.
     """
-    handle, aside = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    aside = None
     try:
+        handle, aside = tempfile.mkstemp(prefix=".aside.", dir=target.parent)
         with os.fdopen(handle, "wb") as stream:
             stream.write(content)
         Path(aside).chmod(0o644)
@@ -55,5 +56,6 @@ def write_atomically(target: Path, content: bytes) -> Path:
     except OSError as error:
         raise ConfigError(f"cannot write {target}: {error.strerror or error}") from error
     finally:
-        Path(aside).unlink(missing_ok=True)
+        if aside is not None:
+            Path(aside).unlink(missing_ok=True)
     return target

@@ -73,7 +73,7 @@ class World:
         if not isinstance(self.payload_place, tuple) or len(self.payload_place) != 3:
             raise ConfigError(f"World.payload_place must be (x, y, z), got {self.payload_place!r}")
         require(self, between(-0.5, 0.5), "payload_place")
-        if self.sensors not in SENSORS:
+        if str(self.sensors) not in SENSORS:
             raise ConfigError(unknown_name("World.sensors", str(self.sensors), SENSORS))
 
     @staticmethod

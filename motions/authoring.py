@@ -91,7 +91,7 @@ class Parameter:
             TimelineError: if it is not valid.
         """
         if isinstance(self.valid, Choice):
-            if value not in self.valid.words:
+            if str(value) not in self.valid.words:
                 raise TimelineError(unknown_name(self.name, str(value), self.valid.words))
             return value
         if not (is_number(value) and self.valid.low <= float(value) <= self.valid.high):

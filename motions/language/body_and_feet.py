@@ -255,7 +255,7 @@ class BodyAndFeet(TimelineData):
             TimelineError: for an unknown joint, a foot on the ground, or a wrong value.
         """
         which = arguments.foot(leg)
-        if joint not in _JOINTS:
+        if str(joint) not in _JOINTS:
             raise TimelineError(unknown_name("joint", str(joint), _JOINTS))
         before = [key.target for key in self.in_order(LegKey) if key.leg is which]
         if not before or before[-1].frame is Frame.GROUND:

@@ -168,7 +168,7 @@ class TimelineData:
                     f"{getattr(self, name)!r}"
                 )
         positive("shift_time", self.shift_time)
-        if self.physics not in PHYSICS:
+        if str(self.physics) not in PHYSICS:
             raise TimelineError(unknown_name("physics", str(self.physics), PHYSICS))
         if not isinstance(self.tolerance, Tolerance):
             raise TimelineError(

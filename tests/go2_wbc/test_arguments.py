@@ -24,6 +24,7 @@ ARRAY, FINITE, WHOLE = (
     f"a finite number, {LARGEST:g} at most",
     "a whole number",
 )
+PATH = "a path that a file can have"
 
 
 @pytest.mark.parametrize(
@@ -35,7 +36,8 @@ ARRAY, FINITE, WHOLE = (
         (str, ["", "a"], [1, b"a"], "a text"),
         (float | None, [None, 2], ["2", np.nan], f"{FINITE} or None"),
         (int | float, [1, 2.5], ["2"], FINITE),
-        (Path, ["a", Path("a")], [1], "a path"),
+        (Path, ["a", Path("a"), "b/" + 255 * "a"], [1, 256 * "a", Path("a\0/b")], PATH),
+        (Path | str, ["a"], [128 * "ä"], f"{PATH} or a text"),
         (Callable[[], None], [print], [1], "a function"),
         (Leg, [Leg.FL], ["FL"], "a Leg"),
         (Sequence[int], [[1], (1, 2), [], np.arange(2)], [[1.5], 1, "12"], f"a list, each {WHOLE}"),

@@ -26,7 +26,7 @@ def test_a_file_overrides_the_half_of_a_table_that_it_names_and_an_empty_one_not
     tmp_path: Path,
 ) -> None:
     assert load_config(written(tmp_path, "")) == Config()
-    config = load_config(written(tmp_path, "[wbc.swing_foot]\nkp = [1, 2, 3]"))
+    config = load_config(written(tmp_path, "\ufeff[wbc.swing_foot]\nkp = [1, 2, 3]"))
     assert config.wbc.swing_foot.kp == (1.0, 2.0, 3.0)
     assert config.wbc.swing_foot.kd == Config().wbc.swing_foot.kd
 

@@ -26,6 +26,13 @@ def test_a_file_is_replaced_whole_in_folders_that_are_made_and_none_is_a_folder(
         checked_output(target / "demo.html", (".html",))
 
 
+def test_a_name_may_be_as_long_as_a_file_system_permits(tmp_path: Path) -> None:
+    target = tmp_path / (250 * "n" + ".html")
+    assert write_atomically(target, b"new").read_bytes() == b"new"
+    with pytest.raises(ConfigError, match=r"cannot write .*: No such file or directory"):
+        write_atomically(tmp_path / "none" / "demo.html", b"new")
+
+
 def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -159,22 +159,23 @@ def heights_of(
     return found
 
 
+@typed("lidar", "depth")
 def chosen(
     lidar: LidarConfig | bool, depth: DepthConfig | bool, mjcf: Path | str | None
 ) -> LidarConfig | DepthConfig | None:
     """The numbers of what a robot sees with; None of a blind one.
 
     Raises:
-        ConfigError: for both, or where the ground is not known.
+        ConfigError: for both, what is neither, or where the ground is not known.
     """
     if lidar and depth:
         raise ConfigError("the robot sees with a lidar or with a depth camera, not with both")
     if (lidar or depth) and mjcf is not None:
         name = "lidar" if lidar else "depth"
         raise ConfigError(f"{name} is only for the built model: of an mjcf nobody knows the ground")
-    if isinstance(lidar, LidarConfig) or lidar:
-        return LidarConfig() if lidar is True else lidar
-    return (DepthConfig() if depth is True else depth) or None
+    if lidar:
+        return lidar if isinstance(lidar, LidarConfig) else LidarConfig()
+    return (depth if isinstance(depth, DepthConfig) else DepthConfig()) if depth else None
 
 
 class RangeSensor:

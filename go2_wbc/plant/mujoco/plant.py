@@ -119,7 +119,7 @@ class MujocoPlant(Plant):
         lidar: LidarConfig | bool = False,
         depth: DepthConfig | bool = False,
     ) -> None:
-        if sensors not in SENSORS:
+        if str(sensors) not in SENSORS:
             raise ConfigError(unknown_name("sensors", sensors, SENSORS))
         sight = chosen(lidar, depth, mjcf)
         setup = PlantSetup(
