@@ -9,6 +9,7 @@ subcommands.
 from __future__ import annotations
 
 import argparse
+import errno
 import importlib
 import logging
 import os
@@ -125,17 +126,27 @@ def run_program(program: Program, argv: Sequence[str] | None = None) -> int:
     try:
         try:
             code = _run(program, list(sys.argv[1:] if argv is None else argv))
+            _flush()
         except BrokenPipeError:
             raise
         except (KeyboardInterrupt, Exception) as error:
             message, code = _explained(error)
             print(f"{program.name}: {message}", file=sys.stderr)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        # The reader has gone. Python flushes once more at exit: let that go nowhere.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return ExitCode.BROKEN_PIPE
+            _flush()
+    except OSError as error:
+        _print_no_more()
+        return ExitCode.BROKEN_PIPE if isinstance(error, BrokenPipeError) else ExitCode.RUNTIME
     return code
+
+
+def _flush() -> None:
+    if sys.stdout is not None:  # a process may be started without it
+        sys.stdout.flush()
+
+
+def _print_no_more() -> None:
+    """Nobody reads, or the disk is full. Python flushes once more at exit: it goes nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def high_five_demo() -> int:
@@ -147,7 +158,9 @@ def _run(program: Program, argv: list[str]) -> int:
     requested = next((word for word in argv if not word.startswith("-")), None)
     parser = build_parser(program, requested)
     try:
-        args = parser.parse_args(argv)
+        args, unknown = parser.parse_known_args(argv)
+        if unknown:
+            args.refuse(f"unrecognized arguments: {' '.join(unknown)}")
     except SystemExit as stop:  # argparse has printed its help, version or complaint
         return stop.code if isinstance(stop.code, int) else ExitCode.USAGE
     shown = logging.StreamHandler()
@@ -188,12 +201,14 @@ def build_parser(
     version = installed_version(PROGRAM) or "(not installed)"
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {version}")
     _add_verbose(parser)
-    parser.set_defaults(run=None)
+    parser.set_defaults(run=None, refuse=parser.error)
     subparsers = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND")
     for command in program.commands:
         if is_whole or command.name == requested:
             command.add_to(subparsers)
-            _add_verbose(subparsers.choices[command.name], argparse.SUPPRESS)
+            own = subparsers.choices[command.name]
+            own.set_defaults(refuse=own.error)  # with its options, not with those of the program
+            _add_verbose(own, argparse.SUPPRESS)
         else:
             subparsers.add_parser(command.name, help=command.summary)
     return parser
@@ -216,6 +231,9 @@ def _explained(error: BaseException) -> tuple[str, ExitCode]:
         return f"{error}; {hint}", ExitCode.RUNTIME
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}", ExitCode.RUNTIME
+    if isinstance(error, OSError) and error.errno == errno.ENOSPC:
+        _print_no_more()
+        return f"cannot write what it prints: {error.strerror}", ExitCode.RUNTIME
     traceback.print_exception(error)
     return "this is a bug in the program; the lines above say where", ExitCode.RUNTIME
 

@@ -122,13 +122,13 @@ def new(
     """
     if not name.isidentifier() or keyword.iskeyword(name):
         raise CommandError(f"NAME must be a Python name such as my_motion, got {name!r}")
-    if not scene and (name in sys.stdlib_module_names or find_spec(name) is not None):
-        raise CommandError(f"{name}.py would hide the module {name!r}: choose another name")
     suffix = ".xml" if scene else ".py"
     shown = out / f"{name}{suffix}"
-    target = checked_output(shown, [suffix])
-    if target.exists():
+    if shown.exists():
         raise ConfigError(f"{shown} exists already: choose another name")
+    if not scene and (name in sys.stdlib_module_names or find_spec(name) is not None):
+        raise CommandError(f"{name}.py would hide the module {name!r}: choose another name")
+    target = checked_output(shown, [suffix])
     title = name.replace("_", " ").capitalize()
     text = _scene() if scene else STARTER.format(name=name, title=title)
     write_atomically(target, text.encode())

@@ -6,7 +6,7 @@ import os
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -295,6 +295,12 @@ def test_an_interrupt_is_one_line_and_130(act: Callable[[Action], None], run: Ru
     assert run("act", code=ExitCode.INTERRUPTED).err == "go2-wbc: interrupted\n"
 
 
+def test_an_unknown_option_is_told_with_those_of_its_command(run: Run) -> None:
+    told = run("check", "bow", "--jobs", "2", code=USAGE).err
+    assert told.startswith("usage: go2-wbc check")
+    assert "unrecognized arguments: --jobs 2" in told
+
+
 def test_a_reader_that_has_gone_is_no_noise() -> None:
     reading, writing = os.pipe()
     os.close(reading)
@@ -304,6 +310,20 @@ def test_a_reader_that_has_gone_is_no_noise() -> None:
         os.close(writing)
     assert done.returncode == ExitCode.BROKEN_PIPE
     assert done.stderr == ""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is full")
+@pytest.mark.parametrize("words", [("list",), ("--help",)])
+def test_output_that_the_disk_does_not_take_is_one_line(words: Sequence[str]) -> None:
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        done = run_process("-m", "controller.cli.main", *words, stdout=full.fileno())
+    assert done.returncode == ExitCode.RUNTIME
+    assert done.stderr == "go2-wbc: cannot write what it prints: No space left on device\n"
+
+
+def test_a_process_without_output_may_run_a_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdout", None)
+    assert cli.main(["list"]) == ExitCode.OK
 
 
 def test_it_runs_as_a_module_where_its_script_is_not_on_the_path(

@@ -132,13 +132,14 @@ def test_a_new_motion_hides_no_module(name: str, tmp_path: Path, run: Run) -> No
 
 
 def test_a_new_motion_is_feasible_is_not_written_twice_and_is_told_to_a_program(
-    tmp_path: Path, run: Run
+    tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, table = tmp_path / "greet.py", tmp_path / "greet.csv"
     told = json.loads(run("new", "greet", "--out", tmp_path, "--json").out)
     assert told == {"motion": "greet", "file": str(path)}
     run("check", path)
     before = path.read_bytes()
+    monkeypatch.syspath_prepend(tmp_path)  # as with python -m controller.cli, from that folder
     assert "exists already" in run("new", "greet", "--out", tmp_path, code=ExitCode.USAGE).err
     assert path.read_bytes() == before
     told = json.loads(run("export", path, "--out", table, "--json").out)
