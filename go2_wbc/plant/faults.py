@@ -72,6 +72,7 @@ _VALUES: Mapping[FaultKind, float] = {
     FaultKind.NOT_A_NUMBER: np.nan,
     FaultKind.LOST_PACKETS: 0.05,
 }
+_SHARES = (FaultKind.MOTOR, FaultKind.LOST_PACKETS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +106,8 @@ class InjectedFault:
         number = _VALUES[sort] if value is None else value
         if not np.isfinite(at) or not (np.isfinite(number) or value is None):
             raise CommandError(f"a fault needs finite numbers, got at={at!r}, value={value!r}")
+        if sort in _SHARES and not 0.0 <= number <= 1.0:
+            raise CommandError(f"the value of {kind!r} is a share, 0 to 1, got {value!r}")
         return cls(sort, part, at, number)
 
 

@@ -20,16 +20,18 @@ from go2_wbc.arguments import typed
 from go2_wbc.brief import brief
 from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.plant.blocks import HALF_WIDTH, PLATFORM, Block, Terrain
-from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Rule, ranged
+from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Rule, between, ranged
 
 STEEPEST = 0.8
 """Greatest angle [rad] of a slope: steeper than any friction coefficient up to 1 holds."""
+MOST = 10_000  #: Of boxes, steps, blocks, waves or rows: MuJoCo builds a million for minutes
+COUNTED = between(1, MOST)
 CLIMBED = Rule(f"above 0, at most {STEEPEST} rad", lambda angle: 0.0 < angle <= STEEPEST)
 
 
 @typed()
 @dataclass(frozen=True, slots=True)
-@ranged(POSITIVE, count=NOT_NEGATIVE, clear_radius=NOT_NEGATIVE, seed=NOT_NEGATIVE)
+@ranged(POSITIVE, count=between(0, MOST), clear_radius=NOT_NEGATIVE, seed=NOT_NEGATIVE)
 class Boxes(Terrain):
     """Flat ground strewn with low boxes that the robot does not know about.
 
@@ -71,7 +73,7 @@ TREAD = 0.04  #: Thickness [m] of a step with an open riser
 
 @typed()
 @dataclass(frozen=True, slots=True)
-@ranged(POSITIVE)
+@ranged(POSITIVE, count=COUNTED)
 class Stairs(Terrain):
     """Steps that lead up to a platform; with a ``count`` of 1 a single step."""
 
@@ -121,7 +123,7 @@ class Stairs(Terrain):
 
 @typed()
 @dataclass(frozen=True, slots=True)
-@ranged(POSITIVE)
+@ranged(POSITIVE, count=COUNTED)
 class Blocks(Terrain):
     """Blocks across the way, one behind the other.
 
@@ -203,7 +205,7 @@ STRIPS = 16  #: Flat strips of which a wave is made
 
 @typed()
 @dataclass(frozen=True, slots=True)
-@ranged(POSITIVE)
+@ranged(POSITIVE, count=COUNTED)
 class Waves(Terrain):
     """Waves across the way, from valley to valley.
 
@@ -255,7 +257,7 @@ class _Pit(Terrain):
 
 @typed()
 @dataclass(frozen=True, slots=True)
-@ranged(POSITIVE, uneven=NOT_NEGATIVE, seed=NOT_NEGATIVE)
+@ranged(POSITIVE, count=COUNTED, uneven=NOT_NEGATIVE, seed=NOT_NEGATIVE)
 class Stones(_Pit):
     """Square stepping stones in a pit."""
 

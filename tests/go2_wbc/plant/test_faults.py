@@ -122,4 +122,8 @@ def test_what_cannot_break_is_refused_with_what_can() -> None:
         plant.fault("motor", part="FL_foot")
     with pytest.raises(CommandError, match="finite numbers"):
         plant.fault("gyro", value=np.inf)
+    with pytest.raises(CommandError, match=r"the value of 'motor' is a share, 0 to 1, got -0.5"):
+        plant.fault("motor", part="FL_hip_joint", value=-0.5)
+    with pytest.raises(CommandError, match=r"'lost_packets' is a share, 0 to 1, got 1.1"):
+        plant.fault("lost_packets", value=1.1)
     assert {kind.value for kind in FaultKind} >= {"motor", "encoder", "gyro", "foot_force"}

@@ -103,6 +103,12 @@ def test_stones_lie_in_rows_and_may_be_lower_and_open_stairs_have_nothing_below(
         assert 2.0 * step.half_size[2] == pytest.approx(TREAD)
 
 
+@pytest.mark.parametrize("kind", [Boxes, Stairs, Blocks, Waves, Stones])
+def test_a_million_of_something_is_refused(kind: Callable[..., Terrain]) -> None:
+    with pytest.raises(ConfigError, match=r"\.count must be between . and 10000, got 1000000"):
+        kind(count=10**6)
+
+
 def test_boxes_are_strewn_evenly_but_for_where_the_robot_starts() -> None:
     rows, blocks = Boxes(count=2000).layout(), Boxes(count=2000).blocks()
     assert np.abs(rows[:, :2]).max(axis=0) == pytest.approx(4.0, abs=0.05)
