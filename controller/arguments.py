@@ -11,9 +11,11 @@ from go2_wbc.errors import CommandError, ConfigError, PolicyError
 from go2_wbc.planning.command import finite_number
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.description import GO2
+from go2_wbc.validation import is_finite_number
 
 NAMESPACE = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 LONGEST = 1e6  #: Time [s] of one call: 11 days
+LONGEST_PERIOD = 0.1  #: Control period [s]: a robot falls in three times as long
 
 
 def require_pace(plant: Plant | None, *, realtime: bool) -> None:
@@ -22,6 +24,16 @@ def require_pace(plant: Plant | None, *, realtime: bool) -> None:
         raise ConfigError(
             f"{type(plant).__name__} must get commands without a break: give "
             "GO2Controller(plant=..., realtime=True)"
+        )
+
+
+def require_period(plant: Plant) -> None:
+    """Raise ConfigError if the ``plant`` cannot be controlled in its ``control_period``."""
+    period: object = plant.control_period
+    if not (is_finite_number(period) and 0.0 < period <= LONGEST_PERIOD):
+        raise ConfigError(
+            f"{type(plant).__name__}.control_period must be above 0, at most {LONGEST_PERIOD} s; "
+            f"got {period!r}"
         )
 
 

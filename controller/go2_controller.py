@@ -97,6 +97,7 @@ class GO2Controller:
                     urdf=urdf, robot=config.robot, visuals=viewer, motor=config.motor
                 )
                 opened.callback(plant.close)
+            arguments.require_period(plant)
             self._plant = plant
             self._pilot = build_pilot(
                 plant,

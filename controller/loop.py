@@ -40,6 +40,7 @@ from go2_wbc.wbc.solvers import is_grave
 
 _log = logging.getLogger(__name__)
 
+STATE_SIZES = {"q": 19, "v": 18, "tau": 12, "foot_forces": 4}
 OLDEST_SCAN = 64  #: Ticks by which a scan may be late
 
 
@@ -78,7 +79,7 @@ class ControlLoop:
             payloads: what feels what the robot carries; nobody does unless given.
 
         Raises:
-            PlantError: if the plant does not answer, or its state is not finite.
+            PlantError: if the plant does not answer, or its state is not finite, or none.
         """
         self.plant, self.model, self.wbc, self.telemetry = plant, model, wbc, telemetry
         self._dynamic_wbc = dynamic_wbc or wbc
@@ -89,6 +90,7 @@ class ControlLoop:
         self.fault: Fault | None = None  #: why the last behaviour was ended by the loop, or None
         self.warn: Callable[..., None] = _log.warning  #: writes a line of the log
         self.state: RobotState = plant.read()
+        _require_state(plant, self.state)
         if not _is_plausible(self.state):
             raise PlantError(f"the first state of the plant is not finite: q={self.state.q}")
         self.snapshot: Snapshot = model.snapshot(self.state)
@@ -194,6 +196,13 @@ class ControlLoop:
     def _observe(self) -> bool:
         """Read the plant; returns whether there is a new state."""
         state = self.plant.read()
+        try:
+            return self._take(state)
+        except (AttributeError, TypeError, ValueError):
+            _require_state(self.plant, state)
+            raise
+
+    def _take(self, state: RobotState) -> bool:
         is_finite = _is_plausible(state)
         if is_finite and state.time > self.state.time:
             self._unanswered = 0
@@ -335,6 +344,18 @@ class ControlLoop:
             self.warn("QP failure at t=%.3f s, holding the last torque: %s", time, what)
             return self._commands[-1]
         return JointCommand.damping(DAMPING)
+
+
+def _require_state(plant: Plant, state: RobotState) -> None:
+    """Raise PlantError for what a user's plant takes for a state."""
+    told = f"{type(plant).__name__}.read() must give a RobotState"
+    if not isinstance(state, RobotState):
+        raise PlantError(f"{told}, got {state!r:.80}")
+    for name, size in STATE_SIZES.items():
+        part = getattr(state, name)
+        if not (isinstance(part, np.ndarray) and part.shape == (size,) and part.dtype == float):
+            given = f"{np.shape(part)} of {getattr(part, 'dtype', type(part).__name__)}"
+            raise PlantError(f"{told} with {name} of shape ({size},) of float64, got {given}")
 
 
 def _is_plausible(state: RobotState) -> bool:

@@ -2,15 +2,17 @@
 
 from inspect import isfunction
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 from controller import GO2Controller, Mode
-from go2_wbc.errors import ClosedError, PlantError
+from go2_wbc.errors import ClosedError, ConfigError, PlantError
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.model import JointDynamics, build_spec
 from go2_wbc.robot.description import find_description
 from tests.controller.plants import HANG_GUARD, PERIOD, StillPlant, WatchedPlant, in_thread, is_limp
+from tests.pages import run_python
 
 
 def test_in_realtime_the_robot_stands_and_walks_while_the_script_waits() -> None:
@@ -140,3 +142,51 @@ def test_a_plant_obeys_one_controller_at_a_time() -> None:
         GO2Controller("robot2", plant=plant)
     with GO2Controller("robot2", plant=plant) as go2:
         assert go2.stand()
+
+
+@pytest.mark.parametrize("period", [0.0, -0.002, float("nan"), "2 ms", None, 0.2])
+def test_a_period_in_which_nothing_can_be_controlled_is_refused(period: object) -> None:
+    plant = Mock(spec=MujocoPlant, control_period=period, is_live=False, robot="go2")
+    with pytest.raises(ConfigError, match=r"control_period must be above 0, at most 0.1 s; got"):
+        GO2Controller(plant=plant)
+
+
+NO_STATES = """
+from dataclasses import replace
+from controller import GO2Controller
+from go2_wbc.errors import PlantError
+from tests.controller.plants import WatchedPlant
+
+for wrong in (
+    lambda state: None,
+    lambda state: replace(state, q=state.q[:18]),
+    lambda state: replace(state, v=state.v.astype("f4")),
+    lambda state: replace(state, tau=[0.0] * 12),
+):
+    plant = WatchedPlant()
+    with GO2Controller(plant=plant) as go2:
+        for plant.on_read in (lambda state: state, wrong):
+            try:
+                go2.wait(0.01)
+            except PlantError as error:
+                print(go2.mode.value, error)
+    try:
+        GO2Controller(plant=plant)
+    except PlantError as error:
+        print(error)
+"""
+
+
+def test_what_is_no_state_is_told_with_the_plant_that_gave_it(tmp_path: Path) -> None:
+    # In a process of its own: under pytest the run-time type checks would refuse it first.
+    done = run_python(NO_STATES, tmp_path)
+    told = [
+        ", got None",
+        " with q of shape (19,) of float64, got (18,) of float64",
+        " with v of shape (18,) of float64, got (18,) of float32",
+        " with tau of shape (12,) of float64, got (12,) of list",
+    ]
+    lines = done.stdout.splitlines()
+    assert [line.split("WatchedPlant.read() must give a RobotState") for line in lines] == [
+        [where, what] for what in told for where in ("damped ", "")
+    ], done.stderr
