@@ -204,7 +204,9 @@ def add_motors(spec: mujoco.MjSpec, joints: Sequence[str], description: RobotDes
 
 def add_imu(spec: mujoco.MjSpec, base: str, profile: RobotProfile) -> None:
     """Adds the IMU's site to the body ``base`` with gyro, accelerometer and orientation."""
-    spec.body(base).add_site(name=IMU_SITE, pos=list(profile.imu_place), size=[0.005, 0.005, 0.005])
+    if spec.site(IMU_SITE) is None:  # else its sensors were deleted from an export of ours
+        place = list(profile.imu_place)
+        spec.body(base).add_site(name=IMU_SITE, pos=place, size=[0.005, 0.005, 0.005])
     for name, kind in (
         (GYRO, mujoco.mjtSensor.mjSENS_GYRO),
         (ACCELEROMETER, mujoco.mjtSensor.mjSENS_ACCELEROMETER),

@@ -190,6 +190,7 @@ def settle(
 
     Raises:
         ConfigError: for a keyframe that the model does not have.
+        ModelMismatch: if there is no ground below the robot.
     """
     if setup.keyframe is None:
         _place(model, data, layout, setup.initial_yaw)
@@ -247,8 +248,10 @@ def _place(model: mujoco.MjModel, data: mujoco.MjData, layout: MujocoLayout, yaw
     geom, down = np.zeros(1, dtype=np.int32), np.array([0.0, 0.0, -1.0])
     tops = [np.array([x, y, _RAY_TOP]) for x in _FOOTPRINT for y in _FOOTPRINT]
     distances = [mujoco.mj_ray(model, data, top, down, None, True, -1, geom) for top in tops]
-    ground = max((_RAY_TOP - distance for distance in distances if distance >= 0.0), default=0.0)
-    base_q[2] = ground + _DROP_HEIGHT
+    found = [_RAY_TOP - distance for distance in distances if distance >= 0.0]
+    if not found:
+        raise ModelMismatch("there is no ground at x = y = 0, where the robot begins lying")
+    base_q[2] = max(found) + _DROP_HEIGHT
 
 
 def _kept_file(model: mujoco.MjModel, data: mujoco.MjData, resting: JointCommand) -> Path | None:

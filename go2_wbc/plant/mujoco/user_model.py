@@ -44,6 +44,16 @@ NARROW_RANGE = 0.2
 """rad; ranges in radians that were read as degrees are all narrower, those of a leg wider."""
 RANGE_SLACK = 0.05
 """rad by which a joint may be beyond its range, of which files of several authors differ."""
+LEAST_COSINE = 0.9
+"""Of the angle between a joint's axis and the one meant: models of real robots are off by less."""
+GRAVITY, GRAVITY_SLACK = 9.81, 0.05  #: m/s^2, and the share by which a place's may differ
+_NEEDED = {
+    mujoco.mjtDisableBit.mjDSBL_CONSTRAINT: "constraints",
+    mujoco.mjtDisableBit.mjDSBL_CONTACT: "contacts",
+    mujoco.mjtDisableBit.mjDSBL_GRAVITY: "gravity",
+    mujoco.mjtDisableBit.mjDSBL_ACTUATION: "actuation",
+    mujoco.mjtDisableBit.mjDSBL_SENSOR: "sensors",
+}
 _TURN, _DEGREES = 2.0 * np.pi, "these must be degrees, and the file's angles are in radians"
 SPANS = {
     "from its front to its rear hip": ("FL_hip_joint", "RL_hip_joint"),
@@ -73,7 +83,11 @@ def load_user_model(
     problems = _joint_problems(spec) + _foot_problems(spec) + _actuator_problems(spec)
     if not problems:
         model = _compiled(spec, mjcf)
-        problems = _other_robot(model, description) or _angle_problems(model, description)
+        problems = _other_robot(model, description) or [
+            *_angle_problems(model, description),
+            *_axis_problems(model),
+            *_option_problems(model),
+        ]
     if problems:
         title = description.profile.title
         listing = "".join(f"\n  - {problem}" for problem in problems)
@@ -221,6 +235,38 @@ def _angle_problems(model: mujoco.MjModel, description: RobotDescription) -> lis
             angle = float(key.qpos[joint.qposadr[0]])
             if abs(angle) > _TURN:
                 problems.append(f"keyframe {key.name!r} has {name} at {angle:g} rad: {_DEGREES}")
+    return problems
+
+
+def _axis_problems(model: mujoco.MjModel) -> list[str]:
+    """Joints that turn another way than those whose angles the controller takes them for."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    problems = []
+    for name in JOINT_NAMES:
+        joint = model.joint(name).id
+        base = model.body_rootid[model.jnt_bodyid[joint]]
+        axis = data.xaxis[joint] @ data.xmat[base].reshape(3, 3)
+        ahead = name.endswith("hip_joint")
+        if axis[0 if ahead else 1] < LEAST_COSINE:
+            told = ", ".join(f"{part:.2f}" for part in (axis + 0.0).tolist())
+            wanted = "1, 0, 0" if ahead else "0, 1, 0"
+            problems.append(f"{name} turns about ({told}) of the base, not ({wanted})")
+    return problems
+
+
+def _option_problems(model: mujoco.MjModel) -> list[str]:
+    """Physics under which no robot can stand, or that the controller does not reckon with."""
+    problems = [
+        f"its <option> disables {what}"
+        for flag, what in _NEEDED.items()
+        if model.opt.disableflags & flag
+    ]
+    gravity = float(np.linalg.norm(model.opt.gravity))
+    if abs(gravity / GRAVITY - 1.0) > GRAVITY_SLACK:
+        problems.append(
+            f"its gravity is {gravity:.2f} m/s^2, the controller reckons with {GRAVITY}"
+        )
     return problems
 
 

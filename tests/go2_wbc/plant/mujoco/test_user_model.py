@@ -1,5 +1,6 @@
 """A user's own MJCF is driven like the built model, or refused with everything it lacks."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -84,6 +85,19 @@ def test_an_export_that_has_our_sensors_is_accepted(tmp_path: Path) -> None:
     path = tmp_path / "own.xml"
     path.write_text(spec.to_xml(), encoding="utf-8")
     assert MujocoPlant(path).read().tilt < 0.2
+    without = re.sub("<sensor>.*?</sensor>", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+    path.write_text(without, encoding="utf-8")
+    assert MujocoPlant(path).imu().accelerometer == pytest.approx(MujocoPlant().imu().accelerometer)
+
+
+def test_a_scene_without_ground_below_the_robot_is_refused(users_mjcf: Mjcf) -> None:
+    def edit(spec: mujoco.MjSpec) -> None:
+        spec.delete(spec.geom(FLOOR))
+        spec.worldbody.add_geom(name="step", pos=[3.0, 0, 0], size=[1, 1, 0.1])
+        spec.geom("step").type = mujoco.mjtGeom.mjGEOM_BOX
+
+    with pytest.raises(ModelMismatch, match="no ground at x = y = 0"):
+        MujocoPlant(users_mjcf(edit))
 
 
 def test_motors_and_floor_are_added_and_the_tighter_motor_limit_wins(users_mjcf: Mjcf) -> None:
@@ -273,6 +287,18 @@ def take_radians_for_degrees(spec: mujoco.MjSpec) -> None:
         joint.range = np.radians(joint.range)
 
 
+def flip_axis(spec: mujoco.MjSpec) -> None:
+    spec.joint("RL_thigh_joint").axis = [0.0, -1.0, 0.0]
+
+
+def disable_contacts(spec: mujoco.MjSpec) -> None:
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+
+
+def go_to_the_moon(spec: mujoco.MjSpec) -> None:
+    spec.option.gravity = [0.0, 0.0, -1.62]
+
+
 FAULTS: list[tuple[Edit, str]] = [
     (rename_joint, "no joint FL_hip_joint"),
     (fix_base, "base body 'base' has no free joint"),
@@ -284,6 +310,9 @@ FAULTS: list[tuple[Edit, str]] = [
     (second_motor, "actuator booster of FL_calf_joint is a second actuator"),
     (lengthen_thighs, "its thigh is 0.233 m, not 0.213 m"),
     (make_heavy, "it weighs 31.1 kg, the robot that is controlled 16.1 kg"),
+    (flip_axis, "RL_thigh_joint turns about (0.00, -1.00, 0.00) of the base, not (0, 1, 0)"),
+    (disable_contacts, "its <option> disables contacts"),
+    (go_to_the_moon, "its gravity is 1.62 m/s^2, the controller reckons with 9.81"),
     (take_radians_for_degrees, 'it needs <compiler angle="radian"/>'),
 ]
 
