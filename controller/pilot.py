@@ -7,9 +7,11 @@ procedures into calls.
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable
 from functools import partial
+from math import inf
 
 from controller import modes
 from controller.acceptance import Acceptance
@@ -17,6 +19,7 @@ from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.standing import Standing
 from controller.modes import Aborted, Measurements, Mode
 from controller.navigation import Goal
+from controller.pacing import LogOnce
 from controller.policies.policy import Policy
 from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
@@ -34,6 +37,11 @@ READY_TIME = 0.2  #: Time [s] that a robot is given to stand ready in walking mo
 HOLD_TIME = 0.4  #: Time [s] in which a robot that stands takes the exact posture
 LOOK_TIME = 0.03
 """Time [s] for which a limp robot's feet are looked at: one that stands sinks by 3 mm."""
+UNMOVED = (
+    "stop() comes before any time has passed since move(): the robot has not moved. Time passes in "
+    "wait(2.0), not in time.sleep(2); with GO2Controller(realtime=True) in both"
+)
+_log = logging.getLogger(__name__)
 
 
 class Pilot:
@@ -55,6 +63,7 @@ class Pilot:
         self._walker = Walker(runner, config)
         self.excess, self.collapse = self._walker.excess, runner.interrupt
         self._goal: Goal | None = None
+        self._asked_at, self._unmoved = -inf, LogOnce(_log)
         self._commands = threading.Lock()  # held to take one, and to begin what takes none
         self.playing: PlayPlan | None = None
         self._must_return = False
@@ -215,6 +224,8 @@ class Pilot:
                 raise ModeError(f"move() during a goal ({goal.name}): end it by stop()")
             if mode is not Mode.WALKING:
                 raise ModeError(f"move() needs walking mode, not {mode.value}: call walk() first")
+            if command != ZERO_COMMAND:
+                self._asked_at = self._loop.state.time
             return self._walker.follow(command, pose)
 
     def rest(self) -> Measurements:
@@ -253,7 +264,11 @@ class Pilot:
                 return goal.is_done(loop.state) or bool(walking.blocked or walking.refusal)
 
             goal.begin(loop.state)
-            self._runner.until(is_over, goal.time_limit, goal.name)
+
+            def got() -> str:
+                return modes.listed(goal.measurements(loop.state))
+
+            self._runner.until(is_over, goal.time_limit, goal.name, got)
             blocked = self._walker.walking.blocked or self._walker.refusal
             self.rest()
             was_halted = self._goal is None
@@ -273,6 +288,8 @@ class Pilot:
 
         The goal's own call then brings the robot to rest.
         """
+        if self._asked_at == self._loop.state.time and not self._runner.is_realtime:
+            self._unmoved.warn(1, UNMOVED)
         had_goal, self._goal = self._goal is not None, None
         self._walker.halt()
         return had_goal

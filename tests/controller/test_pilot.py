@@ -37,10 +37,24 @@ def test_a_robot_that_is_lifted_is_not_standing(go2: GO2Controller, plant: Watch
     assert go2.mode is not Mode.STANDING
 
 
+def test_who_stops_before_any_time_has_passed_is_told_so_once(
+    go2: GO2Controller, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert go2.walk()
+    go2.move(0.2)
+    go2.wait(0.1)
+    go2.stop()
+    assert caplog.text == ""
+    for _ in range(2):
+        go2.move(0.2)
+        go2.stop()
+    assert caplog.text.count("Time passes in wait(2.0), not in time.sleep(2)") == 1
+
+
 @pytest.mark.parametrize(
     ("goal", "name", "said", "reason"),
     [
-        (TurnInPlace, "command", ZERO_COMMAND, "turn by 17.2 deg not done within 8.9 s: "),
+        (TurnInPlace, "command", ZERO_COMMAND, "turn by 17.2 deg not done within 8.9 s: asked"),
         (DriveStraight, "is_done", True, "walk 0.500 m missed: distance from the goal [m] 0."),
     ],
 )
