@@ -3,9 +3,9 @@
 import pytest
 
 from benchmarks import combined
-from benchmarks.rough import LATEST, UnreliablePlant
+from benchmarks.rough import LATEST, WAYS, UnreliablePlant, measure_way
 from benchmarks.study import TrialResult
-from controller.sweeps.trials import Trial, TrialRobot
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.plant import MujocoPlant
 
 
@@ -39,6 +39,19 @@ def test_a_robot_whose_commands_come_late_by_turns_is_sound_and_walks_on_level_g
             assert not robot.go2._pilot._walker.walking._planner._state.ground.rough_way
         assert not robot.truth.recording().touches_itself.any()
         assert robot.go2.health.is_sound
+
+
+@pytest.mark.slow
+def test_a_robot_that_walks_fast_off_an_edge_on_slippery_ground_mostly_comes_down() -> None:
+    """6 of 40 did, when it braked by less than 0.4 m/s^2 there; now 30 of 40."""
+    (way,) = (way for way in WAYS if way.name == "fast-stairs-down")
+    fallen = 0
+    for seed in range(4):
+        try:
+            measure_way(Trial(seed, sensors="imu"), TrialResult(), way, first_seed=131000)
+        except TrialFailed:
+            fallen += 1
+    assert fallen <= 2
 
 
 def test_what_a_walk_has_shown_of_the_ground_is_known_to_the_next() -> None:
