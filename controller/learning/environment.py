@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float32, UInt8
+from jaxtyping import Float, Float32, UInt8
 
 from controller.learning import rewards
 from controller.learning.tasks import LearningTask, find_task
@@ -35,6 +35,7 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import FALLEN_TILT, TOUCH
 from go2_wbc.plant.mujoco.setup import SavedPhysics
 from go2_wbc.records import Array3
+from go2_wbc.validation import LARGEST
 from go2_wbc.world import World
 
 with needing("learning", "environments need gymnasium"):
@@ -129,9 +130,9 @@ class Go2Env(gymnasium.Env[Seen, np.ndarray]):
         Raises:
             CommandError: for another option, or a command that is not three finite numbers.
         """
+        fixed = _command_of(options or {})
         super().reset(seed=seed)
-        rng, task = self.np_random, self.task
-        self._fixed = _command_of(options or {})
+        rng, task, self._fixed = self.np_random, self.task, fixed
         number = int(rng.integers(max(len(task.terrains), 1)))
         self._plant, saved = self._plant_on(number)
         noise = np.random.default_rng(int(rng.integers(2**63))).bit_generator.state
@@ -158,9 +159,10 @@ class Go2Env(gymnasium.Env[Seen, np.ndarray]):
         """
         if self._is_over:
             raise CommandError("the episode is over: call reset()")
-        action = np.asarray(action, dtype=np.float32)
-        if action.shape != (12,):
-            raise CommandError(f"an action is 12 numbers, got shape {action.shape}")
+        numbers = _numbers(action, 12)
+        if numbers is None or not np.isfinite(numbers).all():
+            raise CommandError(f"an action is 12 finite numbers, got {action!r:.80}")
+        action = np.clip(numbers, -LARGEST, LARGEST).astype(np.float32)
         self._shove()
         has_diverged = False
         try:
@@ -248,14 +250,25 @@ class Go2Env(gymnasium.Env[Seen, np.ndarray]):
 
 
 def _command_of(options: dict[str, Any]) -> Array3 | None:
+    if not isinstance(options, dict):
+        raise CommandError(f"options of reset are a dictionary, got {options!r:.80}")
     if unknown := options.keys() - {"command"}:
         raise CommandError(unknown_name("option of reset", str(min(unknown)), ["command"]))
     if "command" not in options:
         return None
-    command = np.array(options["command"], dtype=float)
-    if command.shape != (3,) or not np.isfinite(command).all():
+    command = _numbers(options["command"], 3)
+    if command is None or not np.isfinite(command).all():
         raise CommandError(f"a command is three finite numbers, got {options['command']!r}")
     return command
+
+
+def _numbers(given: object, size: int) -> Float[np.ndarray, " n"] | None:
+    """``given`` as ``size`` numbers; None if it is none such."""
+    try:
+        numbers = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        return None
+    return numbers if numbers.shape == (size,) else None
 
 
 def _told(world: World) -> dict[str, float]:
