@@ -142,7 +142,7 @@ class RobotRun:
             for step in self.steps:
                 try:
                     step(go2)
-                    ledger.lines.append(f"{go2.mode} {go2.last_outcome}")
+                    ledger.lines.append(f"Mode.{go2.mode.name} {go2.last_outcome}")
                 except Go2WbcError as error:
                     ledger.lines.append(f"{type(error).__name__}: {error}")
 

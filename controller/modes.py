@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import Enum
+from enum import StrEnum
 
 import numpy as np
 from jaxtyping import Float
@@ -15,8 +15,8 @@ from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.state import Snapshot
 
 
-class Mode(Enum):
-    """What the robot is doing between calls."""
+class Mode(StrEnum):
+    """What the robot is doing between calls; equal to its name in lower case."""
 
     LYING = "lying"
     STANDING = "standing"

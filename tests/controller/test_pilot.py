@@ -23,6 +23,7 @@ def test_a_robot_that_does_not_move_never_gets_a_yes(call: str) -> None:
         assert getattr(go2, call)() is False
         assert go2.last_outcome.reason.startswith("stand not done within 3.0 s: height error [m]")
         assert go2.mode is Mode.MOVING
+        assert f"{go2.mode}" == go2.mode == "moving"
         assert go2.last_outcome.measured["base speed [m/s]"] == 0.0
 
 
