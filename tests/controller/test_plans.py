@@ -9,6 +9,7 @@ from jaxtyping import Float
 from controller import GO2Controller
 from controller.behaviours.plans import (
     APPROACH,
+    DOUBT,
     FARTHEST,
     LEAST_WEIGHT,
     FeltWeight,
@@ -191,9 +192,10 @@ def test_what_was_felt_before_the_first_foot_left_the_ground_stays(model: RobotM
     legs = [LegTask.STANCE] * 4
     legs[Leg.FR] = LegTask.SWING
     weight = FeltWeight(NO_FRICTION)
-    for _ in range(200):
+    for _ in range(round(DOUBT / DT)):
         weight.add_to(planned(), snapshot, DT)
     felt = weight.ratio
+    assert felt == pytest.approx(0.95, abs=1e-6)  # half of it is believed
     heavier, _ = pressed(model, at_rest(1), 1.3)
     for target in (planned(0.0, tuple(legs)), planned()):
         weight.add_to(target, heavier, DT)

@@ -122,16 +122,13 @@ def test_plans_are_those_recorded(name: str, wild: bool) -> None:
     assert_as_recorded(FILE, f"plan {name} {'wild' if wild else 'calm'}", kept(rows))
 
 
-def readings(name: str, *, wild: bool) -> Iterator[tuple[SensorReading, Snapshot]]:
-    """What a robot senses on such a walk, with noise."""
-    rng = np.random.default_rng(3)
-    for _, now, _ in walked(name, wild=wild):
-        state = now.state
-        force = now.R_world_base.T @ np.array([0.0, 0.0, MODEL.gravity])
-        gyro, felt = (part + rng.normal(scale=0.02, size=3) for part in (state.v[3:6], force))
-        q, v = state.q[7:] + 1e-4 * rng.normal(size=12), state.v[6:]
-        forces = np.where(state.feet_in_contact, 40.0, 1.0) + rng.normal(size=4)
-        yield SensorReading(state.time, gyro, felt, q, v, state.tau, forces), now
+def sensed(now: Snapshot, rng: np.random.Generator) -> SensorReading:
+    """What a robot senses in such a state, with noise."""
+    state, force = now.state, now.R_world_base.T @ np.array([0.0, 0.0, MODEL.gravity])
+    gyro, felt = (part + rng.normal(scale=0.02, size=3) for part in (state.v[3:6], force))
+    q, v = state.q[7:] + 1e-4 * rng.normal(size=12), state.v[6:]
+    forces = np.where(state.feet_in_contact, 40.0, 1.0) + rng.normal(size=4)
+    return SensorReading(state.time, gyro, felt, q, v, state.tau, forces)
 
 
 SENSED: dict[str, tuple[tuple[str, str, float | None], ...]] = {
@@ -152,8 +149,9 @@ def test_states_and_broken_parts_are_those_recorded(broken: str, wild: bool) -> 
     faults, rows = Faults(MODEL.description), defaultdict[str, list[Any]](list)
     faults.known = tuple(InjectedFault.of(k, part, 0.4, value) for k, part, value in SENSED[broken])
     estimator = StateEstimator(MODEL, EstimatorConfig())
-    for reading, _ in readings("trot", wild=wild):
-        state = estimator.update(faults.broken(reading))
+    rng = np.random.default_rng(3)
+    for _, now, _ in walked("trot", wild=wild):
+        state = estimator.update(faults.broken(sensed(now, rng)))
         rows["state"].append([*state.q, *state.v, *state.foot_forces, *state.feet_in_contact])
         rows["estimator"].append(estimator._state.row)
     assert estimator.watch is not None

@@ -15,27 +15,31 @@ from jaxtyping import AbstractArray
 
 import go2_wbc
 from go2_wbc.compilation import Routine
-from go2_wbc.contacts import GAITS
-from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.height_map import HeightMap
-from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
-from go2_wbc.plant.terrain import Waves
 from go2_wbc.records import Record, _looking_at, layout_of, packed
-from go2_wbc.robot.model import RobotModel
+from go2_wbc.reference import Target
+from go2_wbc.robot.estimator import StateEstimator
+from go2_wbc.robot.motor import JointFriction
+from go2_wbc.robot.payload_estimation import PayloadEstimator
 from go2_wbc.robot.state import Snapshot
-from tests.engine_helpers import random_state, standing_q, state_of
-from tests.go2_wbc.planning.seen import exact_map
+from go2_wbc.wbc.controller import WholeBodyController
+from tests.engine_helpers import MODES, random_state
+from tests.go2_wbc.test_recorded import MODEL, sensed, walked
 from tests.recorded import assert_as_recorded
 
 FILE = Path(__file__).with_name("recorded_kernels.json")
 DRAWS, KEPT = 24, 4  #: Calls of each function, and what is kept of them
+APART = 90  #: Ticks from one moment of a walk that is taken to the next
+FLIPPED = 0.03  #: Share of what may be flags that say the opposite of what a walk has
 LENGTH = 40  #: Of an axis that may have any length
 LEFT_OUT = (
     *("planning.force_mpc.plan_forces", "planning.force_mpc.apply_force_plan"),
     *("planning.locomotion.plan", "planning.mpc.solve_mpc"),
     *("planning.mpc.assemble", "planning.mpc.bound", "planning.trunk.gained"),
+    "wbc.trajectory_loads.room_for_feet",
 )
-"""What takes seconds as plain Python, or arguments that belong together: other tests hold it."""
+"""What takes seconds as plain Python, or arguments that belong together: other tests hold it.
+And what only makes room, in which anything may lie."""
 LONGEST = 5.0  #: Processor time [s] of a call: on such numbers a loop may be a long one
 
 
@@ -55,7 +59,7 @@ def routines() -> dict[str, Routine]:
 def is_drawn(routine: Routine) -> bool:
     """Whether its parameters are numbers, arrays and records: of others nothing is drawn."""
     try:
-        drawn(tuple[*parameters(routine)], np.random.default_rng(0), {})
+        drawn(tuple[*parameters(routine)], np.random.default_rng(0), {}, {})
     except TypeError:
         return False
     return True
@@ -67,39 +71,42 @@ def parameters(routine: Routine) -> list[Any]:
     return [hint for name, hint in hints.items() if name != "return"]
 
 
-MODEL = RobotModel()
+def moments(name: str) -> Iterator[dict[type, Any]]:
+    """Records of a robot that walks, by kind: at some ticks of it."""
+    estimator, wbc, rng = (
+        StateEstimator(MODEL),
+        WholeBodyController(MODEL),
+        np.random.default_rng(0),
+    )
+    payload = PayloadEstimator(MODEL, JointFriction.none())
+    for tick, (planner, now, reference) in enumerate(walked(name, wild=False), 1):
+        estimator.update(sensed(now, rng))
+        payload.update(now)
+        if tick % APART == 0:
+            wbc.solve(now, reference)
+            parts = (vars(one).values() for one in (planner, estimator, wbc, payload, MODEL))
+            todo = [Target.of(reference.row), now, *(part for each in parts for part in each)]
+            yield dict(rows_in(todo))
 
 
-def usual() -> dict[type, Any]:
-    """Records of a robot that walks over waves, by kind."""
-    waves = exact_map(Waves(0.08, start=0.2), -1.5, 1.5, 0.8)
-    planner = LocomotionPlanner(MODEL, GAITS["trot"], LocomotionConfig(), waves)
-    now = MODEL.snapshot(state_of(standing_q()))
-    planner.start(now)
-    for tick in range(1, 150):
-        planner.update(
-            now.replaced(state=state_of(standing_q(), time=0.002 * tick)), VelocityCommand(0.5)
-        )
-    assert planner._heights is not None
-    found: dict[type, Any] = {HeightMap: planner._heights}
-    todo = [planner._state, planner._walk]
-    while todo:
-        one = todo.pop()
-        kind = type(one) if issubclass(type(one), Record) else type(one).__mro__[1]
-        found.setdefault(kind, one)
-        parts = (getattr(one, name) for name in layout_of(kind).fields)
-        each = (part if isinstance(part, tuple) else (part,) for part in parts)
-        todo += [part for group in each for part in group if hasattr(part, "row")]
-    return found
+def rows_in(todo: list[Any]) -> Iterator[tuple[type, Any]]:
+    """Every kind of record among these and their parts, with a row of numbers of it."""
+    for one in todo:
+        if isinstance(getattr(one, "row", None), np.ndarray):
+            kind = type(one) if isinstance(one, Record) else type(one).__mro__[1]
+            yield kind, one.row.copy()
+            parts = (getattr(one, name) for name in layout_of(kind).fields)
+            yield from rows_in([part for x in parts for part in (x if type(x) is tuple else (x,))])
 
 
-USUAL = usual()
+SEEING, BLIND = [*moments("up stairs")], [*moments("at once")]
+MOMENTS = [*SEEING, *(SEEING[0] | moment for moment in BLIND)]
 
 
-def drawn(hint: Any, rng: np.random.Generator, sizes: dict[str, int]) -> Any:  # noqa: ANN401 - of any kind
+def drawn(hint: Any, rng: np.random.Generator, sizes: dict[str, int], walk: dict[type, Any]) -> Any:  # noqa: ANN401 - of any kind
     """A value for a parameter; TypeError for a hint of another kind."""
     if typing.get_origin(hint) is typing.Annotated:
-        return drawn(typing.get_args(hint)[0], rng, sizes)
+        return drawn(typing.get_args(hint)[0], rng, sizes, walk)
     if hint is float:
         return np.float64(rng.choice([rng.uniform(0.0, 1.0), rng.normal()]))
     if hint is int:
@@ -107,7 +114,7 @@ def drawn(hint: Any, rng: np.random.Generator, sizes: dict[str, int]) -> Any:  #
     if hint is bool:
         return bool(rng.random() < 0.5)
     if typing.get_origin(hint) is tuple:
-        return tuple(drawn(part, rng, sizes) for part in typing.get_args(hint))
+        return tuple(drawn(part, rng, sizes, walk) for part in typing.get_args(hint))
     if isinstance(hint, type) and issubclass(hint, AbstractArray):
         shape = [
             int(n) if n.isdigit() else sizes.setdefault(n, LENGTH) for n in hint.dim_str.split()
@@ -118,23 +125,31 @@ def drawn(hint: Any, rng: np.random.Generator, sizes: dict[str, int]) -> Any:  #
             return rng.normal(scale=0.5, size=shape)
         return rng.integers(0, 3, size=shape).astype(np.int32)  # as MuJoCo has them
     layout_of(hint)
-    return record_of(hint, rng)
+    return record_of(hint, rng, walk)
 
 
-def record_of(kind: Any, rng: np.random.Generator) -> Any:  # noqa: ANN401 - of any kind
+def record_of(kind: Any, rng: np.random.Generator, walk: dict[type, Any]) -> Any:  # noqa: ANN401 - of any kind
     """A record of drawn numbers; what a walk has of a kind is that, a little changed."""
     layout = layout_of(kind)
-    if kind is Snapshot:
+    if kind is Snapshot and rng.random() < 0.5:
         return MODEL.snapshot(random_state(rng))
-    if kind in USUAL:
-        row = USUAL[kind].row.copy()
-        numbers = np.isfinite(row) & (row != np.round(row))  # no flag, and no count
-        row[numbers] *= rng.uniform(0.8, 1.2, np.count_nonzero(numbers))
-        return _looking_at(kind, row)
+    if kind in walk:
+        row = walk[kind].copy()
+        if kind is not HeightMap:  # its numbers name its cells, as well
+            numbers = np.isfinite(row) & (row != np.round(row))
+            row[numbers] *= rng.uniform(0.8, 1.2, np.count_nonzero(numbers))
+            flags = np.isin(row, (0.0, 1.0)) & (rng.random(row.size) < FLIPPED)
+            row[flags] = 1.0 - row[flags]
+        record = _looking_at(kind, row)
+        if kind is Target and rng.random() < 0.5:
+            record.legs[:], record.force_weight = MODES[rng.integers(len(MODES))], 0.0
+        return record
     try:
         return packed(kind()) if not issubclass(kind, Record) else undecided(kind)
     except TypeError:
         row = rng.uniform(0.0, 1.0, layout.size) * rng.choice([1.0, -0.3], layout.size)
+        whole = rng.random(layout.size) < 0.3  # flags and counts
+        row[whole] = rng.integers(0, 3, np.count_nonzero(whole))
         return _looking_at(kind, row)
 
 
@@ -143,13 +158,13 @@ def undecided(kind: type) -> None:
     raise TypeError(kind)
 
 
-def flat(value: Any) -> Iterator[float]:  # noqa: ANN401 - of any kind
+def flat(*values: Any) -> Iterator[np.ndarray]:  # noqa: ANN401 - of any kind
     """All numbers of what was returned, or filled."""
-    if isinstance(value, tuple):
-        for part in value:
-            yield from flat(part)
-    elif value is not None:
-        yield from np.asarray(getattr(value, "row", value), dtype=float).ravel().tolist()
+    for value in values:
+        if isinstance(value, tuple):
+            yield from flat(*value)
+        elif value is not None:
+            yield np.asarray(getattr(value, "row", value), dtype=float).ravel()
 
 
 def too_long(_signal: int, _frame: FrameType | None) -> None:
@@ -161,23 +176,28 @@ ROUTINES = routines()
 
 @pytest.mark.parametrize("name", ROUTINES)
 def test_a_compiled_function_gives_as_plain_python_what_is_recorded(name: str) -> None:
-    routine, told = ROUTINES[name], [list[float]() for _ in range(KEPT)]
+    routine, told = ROUTINES[name], [list[np.ndarray]() for _ in range(KEPT)]
     failed = 0
     for draw in range(DRAWS):
         rng, sizes = np.random.default_rng(draw), dict[str, int]()
-        given = [drawn(hint, rng, sizes) for hint in parameters(routine)]
+        walk = MOMENTS[draw % len(MOMENTS)]
+        given = [drawn(hint, rng, sizes, walk) for hint in parameters(routine)]
         before = signal.signal(signal.SIGVTALRM, too_long)
         signal.setitimer(signal.ITIMER_VIRTUAL, LONGEST)
         try:
             with np.errstate(all="ignore"):
                 made = routine.written(*given)
-            all_of_it = [*flat(made), *flat(tuple(given))]
+            all_of_it = [*flat(made, *given)]
         except (ArithmeticError, IndexError, ValueError, TimeoutError) as error:
             failed += 1
-            all_of_it = [float(zlib.crc32(type(error).__name__.encode())), *flat(tuple(given))]
+            all_of_it = [*flat(zlib.crc32(type(error).__name__.encode()), *given)]
         finally:
             signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
             signal.signal(signal.SIGVTALRM, before)
-        told[draw % KEPT] += np.arcsinh(all_of_it).tolist()  # so that none outweighs all
-    assert failed < DRAWS / 2, "what is drawn for it is not what it takes"
-    assert_as_recorded(FILE, name, {str(group): each for group, each in enumerate(told)})
+        told[draw % KEPT].append(
+            np.arcsinh(np.concatenate(all_of_it))
+        )  # so that none outweighs all
+    assert failed <= DRAWS / 2, "what is drawn for it is not what it takes"
+    assert_as_recorded(
+        FILE, name, {str(group): np.concatenate(each) for group, each in enumerate(told)}
+    )
