@@ -31,6 +31,7 @@ FILE = Path(__file__).with_name("recorded_kernels.json")
 DRAWS, KEPT = 24, 4  #: Calls of each function, and what is kept of them
 APART = 90  #: Ticks from one moment of a walk that is taken to the next
 FLIPPED = 0.03  #: Share of what may be flags that say the opposite of what a walk has
+ROUNDING = 1e-12  #: What is less is 0 on some processor
 LENGTH = 40  #: Of an axis that may have any length
 LEFT_OUT = (
     *("planning.force_mpc.plan_forces", "planning.force_mpc.apply_force_plan"),
@@ -136,10 +137,10 @@ def record_of(kind: Any, rng: np.random.Generator, walk: dict[type, Any]) -> Any
     if kind in walk:
         row = walk[kind].copy()
         if kind is not HeightMap:  # its numbers name its cells, as well
-            numbers = np.isfinite(row) & (row != np.round(row))
-            row[numbers] *= rng.uniform(0.8, 1.2, np.count_nonzero(numbers))
-            flags = np.isin(row, (0.0, 1.0)) & (rng.random(row.size) < FLIPPED)
-            row[flags] = 1.0 - row[flags]
+            row[np.abs(row) < ROUNDING] = 0.0
+            factors, others = rng.uniform(0.8, 1.2, row.size), rng.random(row.size)
+            row = np.where(np.isfinite(row) & (row != np.round(row)), factors * row, row)
+            row = np.where(np.isin(row, (0.0, 1.0)) & (others < FLIPPED), 1.0 - row, row)
         record = _looking_at(kind, row)
         if kind is Target and rng.random() < 0.5:
             record.legs[:], record.force_weight = MODES[rng.integers(len(MODES))], 0.0

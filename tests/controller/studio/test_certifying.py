@@ -1,7 +1,10 @@
 """How often a motion is done in random worlds, as the studio counts it."""
 
+import shutil
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -9,10 +12,15 @@ import pytest
 from controller.studio.certifying import around, certified, runs_of
 from controller.studio.orders import STOPPED, Doing
 from controller.studio.session import Studio
-from controller.sweeps import run
+from controller.sweeps import certify, run
+from controller.sweeps.motion_study import MotionStudy
 from controller.sweeps.summary import rate_interval
+from controller.sweeps.sweep_file import Row
+from controller.sweeps.targets import Target
 from go2_wbc.errors import StudioError
 from go2_wbc.world import DOUBTFUL, World
+from motions import load_plan
+from tests.held.make import STORED
 from tests.viz.page_reader import read_data, read_message, read_pack
 
 NOD = '''"""Nods."""
@@ -59,6 +67,43 @@ def test_that_it_begins_is_told_before_the_plan_is_written() -> None:
 
     with pytest.raises(StudioError, match="no plan"):
         certified(refuse, {"runs": RUNS}, World(), told.append, threading.Event())
+
+
+@pytest.mark.parametrize("ends", [False, True])
+def test_runs_are_counted_as_they_come_until_it_is_ended(
+    monkeypatch: pytest.MonkeyPatch, *, ends: bool
+) -> None:
+    told, ending, done = list[Doing](), threading.Event(), (True, False, True)
+
+    def swept(
+        target: Target,
+        n: int,
+        *,
+        out: Path,
+        is_enough: Callable[[Sequence[Row]], bool],
+        on_progress: Callable[[object], None],
+    ) -> None:
+        study = target.function
+        assert isinstance(study, MotionStudy)
+        assert (n, study.world) == (RUNS, around(World(friction=0.3)))
+        out.touch()
+        for k in (1, 2, 3):
+            on_progress(None)
+            assert not is_enough([{"done": one} for one in done[:k]])
+        if ends:
+            ending.set()
+        on_progress(None)
+
+    monkeypatch.setattr(run, "sweep", swept)
+    monkeypatch.setattr(certify, "read_certificate", lambda out: out.exists())
+    monkeypatch.setattr(certify, "certified_rate", lambda *given: given)
+    plan = partial(shutil.copy, STORED / "kinematic.plan")
+    with pytest.raises(StudioError, match=STOPPED) if ends else nullcontext():
+        found, of = certified(plan, {"runs": RUNS}, World(friction=0.3), told.append, ending)  # type: ignore[misc]
+        assert (found, of.name) == (True, load_plan(STORED / "kinematic.plan").name)
+    counted = [(sum(done[:k]), *rate_interval(sum(done[:k]), k)) for k in (1, 2, 3)]
+    runs = [Doing("certifying", k, RUNS, rate) for k, rate in enumerate(counted, 1)]
+    assert told == [Doing("certifying", 0.0, RUNS), *runs]
 
 
 @pytest.mark.slow
