@@ -179,7 +179,7 @@ def _answer(
             after = split(source, str(order.path), made.marks, order.part)
             return Answer(motion.name, text=(after.data, after.site and after.offset(after.site)))
         if isinstance(order.part, int):
-            after = written_out(source, maker, order, made)
+            after = written_out(source, maker, order, made, order.part)
             return Answer(motion.name, text=(after.data, None))
         if order.out is not None:
             write_motion(line, order.out, jumps.checker)

@@ -28,19 +28,20 @@ SAME = 1e-9  #: s, m or rad by which keys may differ: numbers are written withou
 MOST_TRIED = 12  #: texts
 
 
-def written_out(source: Source, maker: Maker, order: Order, made: Made) -> Source:
+def written_out(source: Source, maker: Maker, order: Order, made: Made, bar: int) -> Source:
     """With what has made the call of a bar written out.
 
     Args:
         source: the text.
         maker: runs it.
-        order: to do so, the place of which is its ``part``.
+        order: to do so.
         made: what it makes.
+        bar: its place among the calls.
 
     Raises:
         StudioError: if that cannot be done; says why.
     """
-    path, bar = str(order.path), order.part if isinstance(order.part, int) else 0
+    path = str(order.path)
     why = "it is made outside of the motion's own function"
     for text in islice(_Parts(source, path, made, made.marks[bar]).texts(), MOST_TRIED):
         try:

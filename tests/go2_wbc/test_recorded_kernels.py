@@ -30,6 +30,7 @@ from tests.recorded import assert_as_recorded
 FILE = Path(__file__).with_name("recorded_kernels.json")
 DRAWS, KEPT = 24, 4  #: Calls of each function, and what is kept of them
 APART = 90  #: Ticks from one moment of a walk that is taken to the next
+CHANGES = (0.0, 0.02, 0.2)  #: By what share numbers of a walk are changed at most
 FLIPPED = 0.03  #: Share of what may be flags that say the opposite of what a walk has
 ROUNDING = 1e-12  #: What is less is 0 on some processor
 LENGTH = 40  #: Of an axis that may have any length
@@ -60,7 +61,7 @@ def routines() -> dict[str, Routine]:
 def is_drawn(routine: Routine) -> bool:
     """Whether its parameters are numbers, arrays and records: of others nothing is drawn."""
     try:
-        drawn(tuple[*parameters(routine)], np.random.default_rng(0), {}, {})
+        Draw(0).value(tuple[*parameters(routine)])
     except TypeError:
         return False
     return True
@@ -100,58 +101,70 @@ def rows_in(todo: list[Any]) -> Iterator[tuple[type, Any]]:
             yield from rows_in([part for x in parts for part in (x if type(x) is tuple else (x,))])
 
 
-SEEING, BLIND = [*moments("up stairs")], [*moments("at once")]
+SEEING, BLIND = [*moments("up stairs")], [*moments("trot"), *moments("at once")]
 MOMENTS = [*SEEING, *(SEEING[0] | moment for moment in BLIND)]
 
 
-def drawn(hint: Any, rng: np.random.Generator, sizes: dict[str, int], walk: dict[type, Any]) -> Any:  # noqa: ANN401 - of any kind
-    """A value for a parameter; TypeError for a hint of another kind."""
-    if typing.get_origin(hint) is typing.Annotated:
-        return drawn(typing.get_args(hint)[0], rng, sizes, walk)
-    if hint is float:
-        return np.float64(rng.choice([rng.uniform(0.0, 1.0), rng.normal()]))
-    if hint is int:
-        return int(rng.integers(0, 4))
-    if hint is bool:
-        return bool(rng.random() < 0.5)
-    if typing.get_origin(hint) is tuple:
-        return tuple(drawn(part, rng, sizes, walk) for part in typing.get_args(hint))
-    if isinstance(hint, type) and issubclass(hint, AbstractArray):
-        shape = [
-            int(n) if n.isdigit() else sizes.setdefault(n, LENGTH) for n in hint.dim_str.split()
-        ]
-        if "bool" in hint.dtypes:
-            return rng.random(shape) < 0.5
-        if "float64" in hint.dtypes:
-            return rng.normal(scale=0.5, size=shape)
-        return rng.integers(0, 3, size=shape).astype(np.int32)  # as MuJoCo has them
-    layout_of(hint)
-    return record_of(hint, rng, walk)
+class Draw:
+    """Values for the parameters of one call, at a moment of a walk."""
 
+    def __init__(self, number: int) -> None:
+        """What is drawn depends on the ``number`` of the call, and on nothing else."""
+        self._rng, self._sizes = np.random.default_rng(number), dict[str, int]()
+        self._moment = MOMENTS[number % len(MOMENTS)]
+        self._change = CHANGES[(number + number // len(MOMENTS)) % len(CHANGES)]
 
-def record_of(kind: Any, rng: np.random.Generator, walk: dict[type, Any]) -> Any:  # noqa: ANN401 - of any kind
-    """A record of drawn numbers; what a walk has of a kind is that, a little changed."""
-    layout = layout_of(kind)
-    if kind is Snapshot and rng.random() < 0.5:
-        return MODEL.snapshot(random_state(rng))
-    if kind in walk:
-        row = walk[kind].copy()
-        if kind is not HeightMap:  # its numbers name its cells, as well
-            row[np.abs(row) < ROUNDING] = 0.0
-            factors, others = rng.uniform(0.8, 1.2, row.size), rng.random(row.size)
-            row = np.where(np.isfinite(row) & (row != np.round(row)), factors * row, row)
-            row = np.where(np.isin(row, (0.0, 1.0)) & (others < FLIPPED), 1.0 - row, row)
-        record = _looking_at(kind, row)
-        if kind is Target and rng.random() < 0.5:
-            record.legs[:], record.force_weight = MODES[rng.integers(len(MODES))], 0.0
-        return record
-    try:
-        return packed(kind()) if not issubclass(kind, Record) else undecided(kind)
-    except TypeError:
-        row = rng.uniform(0.0, 1.0, layout.size) * rng.choice([1.0, -0.3], layout.size)
-        whole = rng.random(layout.size) < 0.3  # flags and counts
-        row[whole] = rng.integers(0, 3, np.count_nonzero(whole))
-        return _looking_at(kind, row)
+    def value(self, hint: Any) -> Any:  # noqa: ANN401 - of any kind
+        """A value for a parameter; TypeError for a hint of another kind."""
+        rng = self._rng
+        if typing.get_origin(hint) is typing.Annotated:
+            return self.value(typing.get_args(hint)[0])
+        if hint is float:
+            return np.float64(rng.choice([rng.uniform(0.0, 1.0), rng.normal()]))
+        if hint is int:
+            return int(rng.integers(0, 4))
+        if hint is bool:
+            return bool(rng.random() < 0.5)
+        if typing.get_origin(hint) is tuple:
+            return tuple(map(self.value, typing.get_args(hint)))
+        if isinstance(hint, type) and issubclass(hint, AbstractArray):
+            sizes = self._sizes
+            each = hint.dim_str.split()
+            shape = [int(n) if n.isdigit() else sizes.setdefault(n, LENGTH) for n in each]
+            if "bool" in hint.dtypes:
+                return rng.random(shape) < 0.5
+            if "float64" in hint.dtypes:
+                return rng.normal(scale=0.5, size=shape)
+            return rng.integers(0, 3, size=shape).astype(np.int32)  # as MuJoCo has them
+        layout_of(hint)
+        return self._record(hint)
+
+    def _record(self, kind: Any) -> Any:  # noqa: ANN401 - of any kind
+        """Of drawn numbers; what a walk has of a kind is that, more or less changed."""
+        rng, size = self._rng, layout_of(kind).size
+        if kind is Snapshot and self._change == CHANGES[-1] and rng.random() < 0.7:
+            now, leg = MODEL.snapshot(random_state(rng)), rng.integers(4)
+            now.J_contacts[leg, 2] *= rng.random() < 0.7  # else the leg is stretched
+            return now
+        if kind in self._moment:
+            row = self._moment[kind].copy()
+            if kind is not HeightMap and self._change:  # its numbers name its cells, as well
+                row[np.abs(row) < ROUNDING] = 0.0
+                factors, others = rng.uniform(-1.0, 1.0, row.size), rng.random(row.size)
+                is_number = np.isfinite(row) & (row != np.round(row))
+                row = np.where(is_number, (1.0 + self._change * factors) * row, row)
+                row = np.where(np.isin(row, (0.0, 1.0)) & (others < FLIPPED), 1.0 - row, row)
+            record = _looking_at(kind, row)
+            if kind is Target and rng.random() < 0.5:
+                record.legs[:], record.force_weight = MODES[rng.integers(len(MODES))], 0.0
+            return record
+        try:
+            return packed(kind()) if not issubclass(kind, Record) else undecided(kind)
+        except TypeError:
+            row = rng.uniform(0.0, 1.0, size) * rng.choice([1.0, -0.3], size)
+            whole = rng.random(size) < 0.3  # flags and counts
+            row[whole] = rng.integers(0, 3, np.count_nonzero(whole))
+            return _looking_at(kind, row)
 
 
 def undecided(kind: type) -> None:
@@ -180,9 +193,8 @@ def test_a_compiled_function_gives_as_plain_python_what_is_recorded(name: str) -
     routine, told = ROUTINES[name], [list[np.ndarray]() for _ in range(KEPT)]
     failed = 0
     for draw in range(DRAWS):
-        rng, sizes = np.random.default_rng(draw), dict[str, int]()
-        walk = MOMENTS[draw % len(MOMENTS)]
-        given = [drawn(hint, rng, sizes, walk) for hint in parameters(routine)]
+        values = Draw(draw)
+        given = [values.value(hint) for hint in parameters(routine)]
         before = signal.signal(signal.SIGVTALRM, too_long)
         signal.setitimer(signal.ITIMER_VIRTUAL, LONGEST)
         try:

@@ -44,9 +44,9 @@ def _made(order: Order) -> Made:
 
 
 def _out(path: Path, data: bytes, bar: int) -> Source:
-    order = Order(path.resolve(), data, "shown", {}, part=bar)
+    order = Order(path.resolve(), data, "shown", {})
     maker = Maker()
-    after = written_out(Source(data), maker, order, made := maker.make(order))
+    after = written_out(Source(data), maker, order, made := maker.make(order), bar)
     now = maker.make(replace(order, data=after.data))
     assert len(now.marks) == len(made.marks)
     call = now.marks[bar].call
