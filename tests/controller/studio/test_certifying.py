@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -22,6 +23,7 @@ from go2_wbc.world import DOUBTFUL, World
 from motions import load_plan
 from tests.held.make import STORED
 from tests.viz.page_reader import read_data, read_message, read_pack
+from viz.content import CertifiedRate
 
 NOD = '''"""Nods."""
 
@@ -95,12 +97,15 @@ def test_runs_are_counted_as_they_come_until_it_is_ended(
         on_progress(None)
 
     monkeypatch.setattr(run, "sweep", swept)
-    monkeypatch.setattr(certify, "read_certificate", lambda out: out.exists())
-    monkeypatch.setattr(certify, "certified_rate", lambda *given: given)
+    judged = Mock(return_value=Mock(spec=CertifiedRate))
+    monkeypatch.setattr(certify, "read_certificate", Path.exists)
+    monkeypatch.setattr(certify, "certified_rate", judged)
     plan = partial(shutil.copy, STORED / "kinematic.plan")
     with pytest.raises(StudioError, match=STOPPED) if ends else nullcontext():
-        found, of = certified(plan, {"runs": RUNS}, World(friction=0.3), told.append, ending)  # type: ignore[misc]
-        assert (found, of.name) == (True, load_plan(STORED / "kinematic.plan").name)
+        rate = certified(plan, {"runs": RUNS}, World(friction=0.3), told.append, ending)
+        assert rate is judged.return_value
+        are_written, of = judged.call_args.args
+        assert (are_written, of.name) == (True, load_plan(STORED / "kinematic.plan").name)
     counted = [(sum(done[:k]), *rate_interval(sum(done[:k]), k)) for k in (1, 2, 3)]
     runs = [Doing("certifying", k, RUNS, rate) for k, rate in enumerate(counted, 1)]
     assert told == [Doing("certifying", 0.0, RUNS), *runs]

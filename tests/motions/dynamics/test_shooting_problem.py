@@ -1,6 +1,7 @@
 """What each cost of a search says of a state: nothing within limits, and what was recorded."""
 
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -67,3 +68,25 @@ def test_costs_are_those_recorded(name: str, model: RobotModel) -> None:
         states.append(state)
     told = costs_of(PROBLEMS[name], model, states, rng.normal(scale=9.0, size=12))
     assert_as_recorded(FILE, name, {cost: np.arcsinh(told[cost]) for cost in told})
+
+
+def test_a_clock_counts_tells_once_what_binds_and_ends_in_time(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    import crocoddyl
+
+    from motions.dynamics import shooting_problem
+
+    now, told, solver = [5.0], list[tuple[int, float]](), Mock(spec=crocoddyl.SolverBoxFDDP, cost=2)
+    monkeypatch.setattr(shooting_problem.time, "thread_time", lambda: now[0])
+    caplog.set_level("INFO")
+    clock = shooting_problem.Clock(30.0, lambda *given: told.append(given), lambda _: ["torque"])
+    for after in (0.0, shooting_problem.FIRST_ANSWER, shooting_problem.FIRST_ANSWER + 0.1, 30.0):
+        now[0] = 5.0 + after
+        clock(solver)
+    now[0] = 35.1
+    with pytest.raises(shooting_problem._Expired):
+        clock(solver)
+    assert told == [(k, 2.0) for k in (1, 2, 3, 4, 5)]
+    assert clock.iterations == 5
+    assert caplog.text.count("what binds: torque") == 1

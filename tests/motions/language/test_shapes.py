@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from jaxtyping import TypeCheckError
 
 from go2_wbc.errors import TimelineError
 from go2_wbc.motion_plan import Posture
@@ -236,3 +237,8 @@ def test_what_makes_no_sense_is_refused(write: object, why: str) -> None:
     assert callable(write)
     with pytest.raises(TimelineError, match=why):
         write()
+
+
+def test_a_path_has_nothing_but_points() -> None:
+    with pytest.raises((TimelineError, TypeCheckError), match="points"):
+        NOD.body_path([{"x": 0.1}, 3], over=1.0)  # type: ignore[list-item]
