@@ -28,6 +28,7 @@ from motions.feasibility import forces as dynamics
 from motions.feasibility.bodies import SelfCollision, hulls_of, self_distance
 from motions.feasibility.forces import Case, Forces
 from motions.feasibility.goal_errors import departure_measurements, departures
+from motions.feasibility.joint_stops import joint_position
 from motions.feasibility.report import FeasibilityReport, Series
 from motions.feasibility.sampled import Sampled, sampled_of
 from motions.language.timeline import Timeline
@@ -297,7 +298,7 @@ class FeasibilityChecker:
             com = replace(com, values=np.minimum(com.values, own.values), margins=margins)
         series = (
             kinematic.reach(case),
-            kinematic.joint_position(case),
+            joint_position(case),
             kinematic.clearance(case, self._hulls),
             kinematic.dragging(case),
             *kinematic.landing(case),

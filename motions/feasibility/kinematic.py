@@ -1,4 +1,4 @@
-"""Checks that need no forces: reach, joints, clearance, landings, smoothness and the ends.
+"""Checks that need no forces: reach, joint speeds, clearance, landings, smoothness and the ends.
 
 Everything is geometry of the ``Trajectory``, in the frame of the motion: z up, ground at z = 0.
 """
@@ -12,15 +12,11 @@ from jaxtyping import Bool, Float
 
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.motion_plan import MotionPlan, Posture
-from go2_wbc.recording import true_runs
 from go2_wbc.reference import Anchor
-from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
-from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from motions.feasibility.bodies import LinkHulls
 from motions.feasibility.forces import FEET, JOINTS, Case
 from motions.feasibility.report import Series
-from motions.plan.trajectory import Trajectory
 from motions.postures import home_poses
 
 ENDS = ("entry", "exit")
@@ -38,81 +34,12 @@ JUMPS = (1.0, 5.0, 12.0)
 of a plan without a jump. Motions that are just fast show in forces, torques and slips."""
 END_BOUNDS = (0.02, 0.05, 0.1)
 """How far [m, rad] the ends may be from their postures, and greatest speed [m/s, rad/s] there."""
-PAIR = 2  #: Standing feet over which a trunk can fall to its side
-TIGHT_ANGLE, TIGHT_SPEED = 0.03, 0.1
-"""Margins below which a warning is due: rad, and share of the least speed limit; own choice."""
+TIGHT_SPEED = 0.1  #: Margin, as share of the least limit, below which a warning is due; own choice
 
 
 def reach(case: Case) -> Series:
     """Whether the standing legs reach their feet's places."""
     return case.series("reach", "m", FEET, case.path.miss, case.limits.reach)
-
-
-def joint_position(case: Case) -> Series:
-    """Joint angles against the tighter of the URDF's and the published limits.
-
-    A joint that is asked to go beyond its stop stays at it. Where its foot, or the trunk above a
-    standing one, is off by no more than it may for it, the margin counts as 0: a warning. A raised
-    foot and a knee that is bent as far as it goes may be off by ``limits.stop``: nothing else
-    moves. A standing leg that should be longer lets the trunk sink to its side, farther than that:
-    ``limits.stretch``, or ``limits.stop`` for ``limits.stop_time`` while three feet stand or more:
-    the trunk comes too late for it. Hips of two standing legs keep ``limits.pair_hip`` to their
-    stops: a trunk that rolls late needs them, and no third foot holds it.
-    """
-    motion, model, limits = case.path, case.model, case.limits
-    q, room = motion.q[:, 7:], np.zeros((len(motion.times), 12))
-    few = (motion.stance.sum(axis=1) <= PAIR) & ~motion.is_dynamic
-    is_steady = ~few & ~motion.is_dynamic
-    held = motion.stance & few[:, None]
-    room[:, ::3] = limits.pair_hip * held
-    lower, upper = model.q_lower + room, model.q_upper - room
-    to_lower, to_upper = q - lower, upper - q
-    bounds = np.where(to_lower < to_upper, lower, upper)
-    margins = np.minimum(to_lower, to_upper)
-    for leg in LEGS:
-        own = margins[:, leg.joints]
-        beyond = own.min(axis=1) < 0.0
-        if beyond.any():
-            stands, off = motion.stance[:, leg], np.full(len(q), np.inf)
-            off[beyond] = _stopped(leg, q[beyond], stands[beyond], model)
-            sinks = stands & (to_lower[:, leg.joints][:, 2] >= 0.0)
-            harmless = off <= np.where(sinks, limits.stretch, limits.stop)
-            harmless &= ~(held[:, leg] & (own[:, 0] < 0.0))
-            late = beyond & ~harmless & sinks & is_steady
-            harmless |= _brief(late, motion, limits.stop_time) & (off <= limits.stop)
-            own[harmless] = np.maximum(own[harmless], 0.0)
-    return Series("joint position", "rad", JOINTS, motion.times, q, bounds, margins, TIGHT_ANGLE)
-
-
-def _brief(mask: Bool[np.ndarray, " n"], motion: Trajectory, most: float) -> Bool[np.ndarray, " n"]:
-    """The rows of ``mask`` that are True for no longer than ``most`` [s] at a time."""
-    kept = mask.copy()
-    for rows in true_runs(mask):
-        kept[rows] &= motion.times[rows.stop - 1] - motion.times[rows.start] <= most
-    return kept
-
-
-def _stopped(
-    leg: Leg, q: Float[np.ndarray, "k 12"], stands: Bool[np.ndarray, " k"], model: RobotModel
-) -> Float[np.ndarray, " k"]:
-    """How far a foot, or the trunk over it, is off [m] if the leg's joints stay at their stops.
-
-    A raised foot by as much as the leg's end moves. The joints of a standing leg give way to each
-    other: what a stopped knee takes from the distance of foot and hip is missing, and what a
-    stopped hip or thigh takes from the angle, times that distance: twice, as it is with both legs
-    of a side, and the trunk goes down over them besides.
-    """
-    geometry = LegGeometry.of(model, leg)
-    asked = q[:, leg.joints]
-    kept = np.clip(asked, model.q_lower[leg.joints], model.q_upper[leg.joints])
-    moved = np.linalg.norm(foot_places(geometry, asked) - foot_places(geometry, kept), axis=1)
-    thigh, calf = geometry.thigh, geometry.calf
-    reach, left = (
-        np.sqrt(thigh**2 + calf**2 + 2.0 * thigh * calf * np.cos(angles[:, 2]))
-        for angles in (asked, kept)
-    )
-    turned = np.abs(asked[:, :2] - kept[:, :2]).sum(axis=1)
-    return np.where(stands, np.abs(reach - left) + 2.0 * turned * reach, moved)
 
 
 def joint_speed(case: Case) -> Series:

@@ -11,7 +11,7 @@ from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline
 from motions.feasibility.bodies import LinkHulls, SelfCollision
-from motions.feasibility.kinematic import clearance, ends, joint_position
+from motions.feasibility.kinematic import clearance, ends
 from motions.plan.trajectory import Trajectory, trajectory_of
 from tests.motions.feasibility.cases import case_of
 
@@ -106,18 +106,3 @@ def test_a_foot_that_is_lifted_from_the_first_instant_on_still_stands_then(
     stance[0, 2] = False
     series = ends(case_of(replace(raising, stance=stance), model), plan)
     assert not series.is_broken
-
-
-@pytest.mark.parametrize(("rows", "passes"), [(15, True), (25, False)])
-def test_a_trunk_may_sink_to_a_leg_at_its_stop_for_a_moment(
-    rows: int, passes: bool, model: RobotModel, raising: Trajectory
-) -> None:
-    """Up to 0.17 s all were done that were refused for this alone, from 0.22 s on half."""
-    calf = int(Leg.FL.joints.stop) - 1
-    at = slice(10, 10 + rows)
-    assert raising.stance[at].all()
-    for beyond, is_near in ((0.2, True), (0.3, passes), (0.7, False)):  # 9, 21 and 35 mm
-        q = raising.q.copy()
-        q[at, 7 + calf] = model.q_upper[calf] + beyond
-        margins = joint_position(case_of(replace(raising, q=q), model)).margins[at, calf]
-        assert (margins >= 0.0).all() == is_near, beyond

@@ -1,0 +1,109 @@
+"""Joints that are asked to go beyond their stops, and what that takes from a plan.
+
+A joint stays at its stop. A raised foot is off its place by that. The feet of standing legs do not
+move, so there the trunk is. The controller holds its attitude far more firmly than its place: 0.1
+rad of roll weigh as much as 0.5 m. So it keeps its attitude, and is where all standing legs keep
+their ranges, as near to its plan as that is:
+
+    min  p' K p    such that    q_low <= q(p) <= q_up
+
+of all joints of standing legs, with the place p of the trunk from its plan, the gains K of that and
+the legs' inverse kinematics q(p). Constraints are met one after the other, each by moving along its
+normal, and let go by as much as they did before (Hildreth, *A quadratic programming procedure*,
+Naval Research Logistics Quarterly 1957; for intervals Lent & Censor 1980), q(p) linear near p.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from go2_wbc.legs import LEGS
+from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.wbc.config import WbcConfig
+from motions.feasibility.forces import JOINTS, Case
+from motions.feasibility.report import Series
+
+PAIR = 2  #: Standing feet over which a trunk can fall to its side
+TIGHT_ANGLE = 0.03  #: Margin [rad] below which a warning is due; own choice
+ROUNDS = 12  #: In which every constraint is met once; more move the trunk by less than 0.2 mm
+
+
+def joint_position(case: Case) -> Series:
+    """Joint angles against the tighter of the URDF's and the published limits.
+
+    A joint that is asked to go beyond its stop stays at it. Where its foot is off by no more than
+    ``limits.stop`` for it, or the trunk above standing ones by no more than ``limits.off``, the
+    margin counts as 0: a warning. Hips of two standing legs keep ``limits.pair_hip`` to their
+    stops: a trunk that rolls late needs them, and no third foot holds it.
+    """
+    motion, model, limits = case.path, case.model, case.limits
+    q, stands, room = motion.q[:, 7:], motion.stance, np.zeros((len(motion.times), 12))
+    held = stands & (stands.sum(axis=1) <= PAIR)[:, None] & ~motion.is_dynamic[:, None]
+    room[:, ::3] = limits.pair_hip * held
+    lower, upper = model.q_lower + room, model.q_upper - room
+    to_lower, to_upper = q - lower, upper - q
+    bounds = np.where(to_lower < to_upper, lower, upper)
+    margins = np.minimum(to_lower, to_upper)
+    off, beyond = np.full(stands.shape, np.inf), (margins < 0.0).any(axis=1)
+    off[beyond] = _displaced(q[beyond], stands[beyond], model)
+    is_near = off <= np.where(stands, limits.off, limits.stop)
+    is_near &= ~(held & (margins[:, ::3] < 0.0))
+    margins = np.where(np.repeat(is_near, 3, axis=1), np.maximum(margins, 0.0), margins)
+    return Series("joint position", "rad", JOINTS, motion.times, q, bounds, margins, TIGHT_ANGLE)
+
+
+def _displaced(
+    q: Float[np.ndarray, "k 12"], stance: Bool[np.ndarray, "k 4"], model: RobotModel
+) -> Float[np.ndarray, "k 4"]:
+    """How far each foot, or the trunk over it [m], is off if joints stay at their stops."""
+    kept = np.clip(q, model.q_lower, model.q_upper)
+    asked, least = (np.stack([foot_places(*one) for one in _legs(x, model)], 1) for x in (q, kept))
+    trunk = np.linalg.norm(trunk_at_stops(asked, stance, model), axis=1)
+    return np.where(stance, trunk[:, None], np.linalg.norm(asked - least, axis=2))
+
+
+def _legs(
+    q: Float[np.ndarray, "k 12"], model: RobotModel
+) -> list[tuple[LegGeometry, Float[np.ndarray, "k 3"]]]:
+    return [(LegGeometry.of(model, leg), q[:, leg.joints]) for leg in LEGS]
+
+
+def trunk_at_stops(
+    p_base_feet: Float[np.ndarray, "k 4 3"], stance: Bool[np.ndarray, "k 4"], model: RobotModel
+) -> Float[np.ndarray, "k 3"]:
+    """Where the trunk is [m], from where it should be, in its frame.
+
+    ``p_base_feet``: places (k, 4, 3) of the feet [m] in the planned frame of the trunk, of which
+    those of ``stance`` (k, 4) stand.
+    """
+    count, yields = len(stance), 1.0 / WbcConfig().body_position.arrays[0]
+    p, normals, pulls = np.zeros((count, 3)), np.zeros((count, 12, 3)), np.zeros((count, 12))
+    for _ in range(ROUNDS):
+        for leg in LEGS:
+            geometry, stands = LegGeometry.of(model, leg), stance[:, leg]
+            lower, upper = model.q_lower[leg.joints], model.q_upper[leg.joints]
+            q = leg_angles(geometry, p_base_feet[:, leg] - p).q
+            turns = -np.linalg.pinv(_jacobian(geometry, np.clip(q, lower, upper)))
+            normals[:, leg.joints] = yields * turns
+            start, p = p, (normals * pulls[:, :, None]).sum(axis=1)
+            for i, joint in enumerate(range(leg.joints.start, leg.joints.stop)):
+                now = q[:, i] + ((p - start) * turns[:, i]).sum(axis=1)
+                size = (turns[:, i] * normals[:, joint]).sum(axis=1)
+                least, most = (lower[i] - now) / size, (upper[i] - now) / size
+                pull = np.where(stands, np.clip(-pulls[:, joint], least, most), 0.0)
+                p += pull[:, None] * normals[:, joint]
+                pulls[:, joint] += pull
+    return p
+
+
+def _jacobian(geometry: LegGeometry, q: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3 3"]:
+    """d ``foot_places`` / d q, of legs that are neither stretched nor beside their hip."""
+    s, c = np.sin(q[:, 0]), np.cos(q[:, 0])
+    x, y, z = (foot_places(geometry, q) - geometry.p_base_hip).T
+    ahead = geometry.calf * np.cos(q[:, 1] + q[:, 2])
+    up = geometry.calf * np.sin(q[:, 1] + q[:, 2])
+    down = s * y - c * z
+    J = np.array([[0.0 * x, -down, -ahead], [-z, s * x, -s * up], [y, -c * x, c * up]])
+    return J.transpose(2, 0, 1)
