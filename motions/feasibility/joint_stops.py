@@ -1,9 +1,9 @@
 """Joints that are asked to go beyond their stops, and what that takes from a plan.
 
-A joint stays at its stop. A raised foot is off its place by that. The feet of standing legs do not
-move, so there the trunk is. The controller holds its attitude far more firmly than its place: 0.1
-rad of roll weigh as much as 0.5 m. So it keeps its attitude, and is where all standing legs keep
-their ranges, as near to its plan as that is:
+A joint stays at its stop. A raised foot is off by that: one that follows its place goes to the
+nearest one. The feet of standing legs do not move, so there the trunk is off. The controller holds
+its attitude far more firmly than its place: 0.1 rad of roll weigh as much as 0.5 m. So it keeps its
+attitude, and is where all standing legs keep their ranges, as near to its plan as that is:
 
     min  p' K p    such that    q_low <= q(p) <= q_up
 
@@ -21,7 +21,7 @@ from jaxtyping import Bool, Float
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.wbc.config import WbcConfig
+from go2_wbc.wbc.config import Gains, WbcConfig
 from motions.feasibility.forces import JOINTS, Case
 from motions.feasibility.report import Series
 
@@ -33,10 +33,10 @@ ROUNDS = 12  #: In which every constraint is met once; more move the trunk by le
 def joint_position(case: Case) -> Series:
     """Joint angles against the tighter of the URDF's and the published limits.
 
-    A joint that is asked to go beyond its stop stays at it. Where its foot is off by no more than
-    ``limits.stop`` for it, or the trunk above standing ones by no more than ``limits.off``, the
-    margin counts as 0: a warning. Hips of two standing legs keep ``limits.pair_hip`` to their
-    stops: a trunk that rolls late needs them, and no third foot holds it.
+    A joint that is asked to go beyond its stop stays at it. Where its foot, or the trunk over a
+    standing one, is off by no more than ``limits.stop`` for it, the margin counts as 0: a warning.
+    Hips of two standing legs keep ``limits.pair_hip`` to their stops: a trunk that rolls late needs
+    them, and no third foot holds it.
     """
     motion, model, limits = case.path, case.model, case.limits
     q, stands, room = motion.q[:, 7:], motion.stance, np.zeros((len(motion.times), 12))
@@ -47,21 +47,34 @@ def joint_position(case: Case) -> Series:
     bounds = np.where(to_lower < to_upper, lower, upper)
     margins = np.minimum(to_lower, to_upper)
     off, beyond = np.full(stands.shape, np.inf), (margins < 0.0).any(axis=1)
-    off[beyond] = _displaced(q[beyond], stands[beyond], model)
-    is_near = off <= np.where(stands, limits.off, limits.stop)
-    is_near &= ~(held & (margins[:, ::3] < 0.0))
+    off[beyond] = _displaced(q[beyond], stands[beyond], motion.swings[beyond], model)
+    is_near = (off <= limits.stop) & ~(held & (margins[:, ::3] < 0.0))
     margins = np.where(np.repeat(is_near, 3, axis=1), np.maximum(margins, 0.0), margins)
     return Series("joint position", "rad", JOINTS, motion.times, q, bounds, margins, TIGHT_ANGLE)
 
 
 def _displaced(
-    q: Float[np.ndarray, "k 12"], stance: Bool[np.ndarray, "k 4"], model: RobotModel
+    q: Float[np.ndarray, "k 12"],
+    stance: Bool[np.ndarray, "k 4"],
+    swings: Bool[np.ndarray, "k 4"],
+    model: RobotModel,
 ) -> Float[np.ndarray, "k 4"]:
-    """How far each foot, or the trunk over it [m], is off if joints stay at their stops."""
+    """How far each foot, or the trunk over it [m], is off if joints stay at their stops.
+
+    A foot that follows its place goes to the nearest one; one that follows its joints keeps those
+    that are not at their stops.
+    """
+    config = WbcConfig()
     kept = np.clip(q, model.q_lower, model.q_upper)
-    asked, least = (np.stack([foot_places(*one) for one in _legs(x, model)], 1) for x in (q, kept))
-    trunk = np.linalg.norm(trunk_at_stops(asked, stance, model), axis=1)
-    return np.where(stance, trunk[:, None], np.linalg.norm(asked - least, axis=2))
+    asked, left = (np.stack([foot_places(*one) for one in _legs(x, model)], 1) for x in (q, kept))
+    trunk = trunk_at_stops(asked, stance, config.body_position, model)
+    off = np.where(stance[:, :, None], trunk[:, None], asked - left)
+    for leg in LEGS:
+        alone = swings & (np.arange(len(LEGS)) == leg)
+        if alone.any():
+            nearest = trunk_at_stops(asked, alone, config.swing_foot, model)
+            off[swings[:, leg], leg] = nearest[swings[:, leg]]
+    return np.linalg.norm(off, axis=2)
 
 
 def _legs(
@@ -71,17 +84,21 @@ def _legs(
 
 
 def trunk_at_stops(
-    p_base_feet: Float[np.ndarray, "k 4 3"], stance: Bool[np.ndarray, "k 4"], model: RobotModel
+    p_base_feet: Float[np.ndarray, "k 4 3"],
+    stance: Bool[np.ndarray, "k 4"],
+    gains: Gains,
+    model: RobotModel,
 ) -> Float[np.ndarray, "k 3"]:
     """Where the trunk is [m], from where it should be, in its frame.
 
     ``p_base_feet``: places (k, 4, 3) of the feet [m] in the planned frame of the trunk, of which
-    those of ``stance`` (k, 4) stand.
+    those of ``stance`` (k, 4) stand; ``gains`` pull the trunk back to its place. A foot that goes
+    to the nearest place itself goes there by as much, the other way.
     """
-    count, yields = len(stance), 1.0 / WbcConfig().body_position.arrays[0]
+    count, yields = len(stance), 1.0 / gains.arrays[0]
     p, normals, pulls = np.zeros((count, 3)), np.zeros((count, 12, 3)), np.zeros((count, 12))
     for _ in range(ROUNDS):
-        for leg in LEGS:
+        for leg in (leg for leg in LEGS if stance[:, leg].any()):
             geometry, stands = LegGeometry.of(model, leg), stance[:, leg]
             lower, upper = model.q_lower[leg.joints], model.q_upper[leg.joints]
             q = leg_angles(geometry, p_base_feet[:, leg] - p).q

@@ -44,6 +44,8 @@ class Trajectory:
     rpy: Float[np.ndarray, "n 3"]  #: (n, 3) roll, pitch, yaw [rad] of the trunk
     p_com: Float[np.ndarray, "n 3"]  #: (n, 3) CoM [m]
     stance: Bool[np.ndarray, "n 4"]  #: (n, 4) feet that stand
+    swings: Bool[np.ndarray, "n 4"]
+    """(n, 4) feet in the air that follow their places; the others follow their joints."""
     load_share: Float[np.ndarray, "n 4"]  #: (n, 4) share of its load that each may bear
     p_feet: Float[np.ndarray, "n 4 3"]
     """(n, 4, 3) where the feet are [m] of legs that do not follow their joints."""
@@ -112,6 +114,7 @@ def trajectory_of(
         rpy=rpy,
         p_com=placed.p_com,
         stance=asked.stance,
+        swings=~(asked.stance | asked.raised),
         load_share=np.where(share < LEAST_SHARE, 0.0, share),
         p_feet=asked.p_feet,
         miss=placed.miss,

@@ -118,6 +118,7 @@ def random_trajectory(model: RobotModel, count: int, *, pace: float, seed: int) 
         rpy=rpy,
         p_com=poses[:, :3],
         stance=load_share > 0.0,
+        swings=load_share <= 0.0,
         load_share=load_share,
         p_feet=np.zeros((count, 4, 3)),
         miss=np.zeros((count, 4)),
