@@ -36,7 +36,8 @@ def joint_position(case: Case) -> Series:
     A joint that is asked to go beyond its stop stays at it. Where its foot, or the trunk over a
     standing one, is off by no more than ``limits.stop`` for it, the margin counts as 0: a warning.
     Hips of two standing legs keep ``limits.pair_hip`` to their stops: a trunk that rolls late needs
-    them, and no third foot holds it.
+    them, and no third foot holds it. Farther beyond, a joint counts as far as a stretched knee that
+    displaces by as much, if that is more: 0.1 rad of a hip do as 0.3 of a knee.
     """
     motion, model, limits = case.path, case.model, case.limits
     q, stands, room = motion.q[:, 7:], motion.stance, np.zeros((len(motion.times), 12))
@@ -46,11 +47,21 @@ def joint_position(case: Case) -> Series:
     to_lower, to_upper = q - lower, upper - q
     bounds = np.where(to_lower < to_upper, lower, upper)
     margins = np.minimum(to_lower, to_upper)
-    off, beyond = np.full(stands.shape, np.inf), (margins < 0.0).any(axis=1)
+    off, beyond = np.zeros(stands.shape), (margins < 0.0).any(axis=1)
     off[beyond] = _displaced(q[beyond], stands[beyond], motion.swings[beyond], model)
     is_near = (off <= limits.stop) & ~(held & (margins[:, ::3] < 0.0))
-    margins = np.where(np.repeat(is_near, 3, axis=1), np.maximum(margins, 0.0), margins)
+    near, far = (np.repeat(x, 3, axis=1) for x in (is_near, _knee_angle(off, model)))
+    counted = np.where(near, 0.0, np.minimum(margins, -far))
+    margins = np.where(margins < 0.0, counted, margins)
     return Series("joint position", "rad", JOINTS, motion.times, q, bounds, margins, TIGHT_ANGLE)
+
+
+def _knee_angle(off: Float[np.ndarray, "n 4"], model: RobotModel) -> Float[np.ndarray, "n 4"]:
+    """By how much [rad] a knee at its stop has to stretch for a foot that is farther by ``off``."""
+    leg = LegGeometry.of(model, LEGS[0])
+    stop, squares, twice = model.q_upper[2], leg.thigh**2 + leg.calf**2, 2.0 * leg.thigh * leg.calf
+    reach = np.sqrt(squares + twice * np.cos(stop)) + off
+    return -stop - np.arccos(np.minimum((reach**2 - squares) / twice, 1.0))
 
 
 def _displaced(

@@ -417,24 +417,28 @@ def test_a_joint_at_its_stop_is_refused_by_what_it_moves(checker: Checker) -> No
     assert checker.check(nose_up(28.0, 0.04)).margins["joint position"].margin < 0.0
 
 
-def test_a_knee_that_folds_no_farther_moves_less_than_one_too_short(
+def test_knees_at_their_stops_may_move_the_trunk_by_as_much_as_nobody_notices(
     checker: Checker,
 ) -> None:
-    # In MuJoCo the first is done, 11 mm off; 22 mm are asked too much. The other is 26 mm off.
+    # In MuJoCo the first is 11 mm off, the others 25 and 30 mm, by which the last is not done.
     sit = Timeline().posture("sit", over=1.5).body(z=-0.042, over=0.8).hold(0.3).home(over=0.6)
     report = checker.check(sit.posture("stand", over=1.5))
     folded = report.margins["joint position"]
     assert folded.subject.endswith("calf")
     assert folded.margin == 0.0
-    stretched = checker.check(Timeline().body(pitch=-deg(26.0), z=0.04, over=1.0).home(over=1.0))
-    assert stretched.margins["joint position"].margin < 0.0
+    for z, is_broken in ((0.04, False), (0.045, True)):
+        line = Timeline().body(pitch=-deg(26.0), z=z, over=1.0).home(over=1.0)
+        stretched = checker.check(line).margins["joint position"]
+        assert stretched.subject.endswith("calf")
+        assert (stretched.margin < 0.0) is is_broken
 
 
-@pytest.mark.parametrize(("angle", "is_refused"), [(38.0, False), (42.0, True), (44.0, True)])
+@pytest.mark.parametrize(("angle", "is_refused"), [(42.0, False), (44.0, True)])
 def test_hips_of_a_pair_that_stands_keep_clear_of_their_stops(
     checker: Checker, angle: float, is_refused: bool
 ) -> None:
-    # A trot that rolled by 52 deg, its hip 0.001 rad past its stop, passed and fell in MuJoCo.
+    # In MuJoCo the first, 0.036 rad from its stop, is done; the other is 34 mm off, one of 46 deg
+    # 82 mm.
     trot = Timeline().walk(-0.2, turn=deg(10.0), gait="trot")
     over = trot.end / 5.0
     lean = Timeline().body(roll=deg(angle), over=over).body(roll=-0.5 * deg(angle), over=over)
