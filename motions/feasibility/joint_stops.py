@@ -50,18 +50,19 @@ def joint_position(case: Case) -> Series:
     off, beyond = np.zeros(stands.shape), (margins < 0.0).any(axis=1)
     off[beyond] = _displaced(q[beyond], stands[beyond], motion.swings[beyond], model)
     is_near = (off <= limits.stop) & ~(held & (margins[:, ::3] < 0.0))
-    near, far = (np.repeat(x, 3, axis=1) for x in (is_near, _knee_angle(off, model)))
+    near, far = (np.repeat(x, 3, axis=1) for x in (is_near, off / _stretching(model)))
     counted = np.where(near, 0.0, np.minimum(margins, -far))
     margins = np.where(margins < 0.0, counted, margins)
     return Series("joint position", "rad", JOINTS, motion.times, q, bounds, margins, TIGHT_ANGLE)
 
 
-def _knee_angle(off: Float[np.ndarray, "n 4"], model: RobotModel) -> Float[np.ndarray, "n 4"]:
-    """By how much [rad] a knee at its stop has to stretch for a foot that is farther by ``off``."""
-    leg = LegGeometry.of(model, LEGS[0])
-    stop, squares, twice = model.q_upper[2], leg.thigh**2 + leg.calf**2, 2.0 * leg.thigh * leg.calf
-    reach = np.sqrt(squares + twice * np.cos(stop)) + off
-    return -stop - np.arccos(np.minimum((reach**2 - squares) / twice, 1.0))
+def _stretching(model: RobotModel) -> float:
+    """By how much [m/rad] a knee at its stop moves the foot away from the hip."""
+    leg, stop = LegGeometry.of(model, LEGS[0]), model.q_upper[2]
+    both = leg.thigh * leg.calf
+    return float(
+        -both * np.sin(stop) / np.sqrt(leg.thigh**2 + leg.calf**2 + 2.0 * both * np.cos(stop))
+    )
 
 
 def _displaced(
