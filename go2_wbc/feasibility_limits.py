@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from go2_wbc.brief import brief
-from go2_wbc.validation import POSITIVE, ranged, retires
+from go2_wbc.validation import POSITIVE, Retired, ranged, retires
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,6 +17,8 @@ from go2_wbc.validation import POSITIVE, ranged, retires
     stance_position=0.02,
     stance_angle=0.05,
     end_speed=0.1,
+    stretch=Retired(0.018, "FeasibilityLimits.stop counts"),
+    stop_time=Retired(0.18, "FeasibilityLimits.stop counts"),
 )
 @ranged(POSITIVE)
 class FeasibilityLimits:
