@@ -76,7 +76,9 @@ class Benchmark:
     takes: str = ""  #: how long it takes, for the help
     examples: tuple[str, ...] = ()  #: arguments, for the help, besides those that all have
     sensors: bool = False  #: whether they can be chosen
-    runs: int = 0  #: how often a study that draws nothing is run, one after the other; 0 for seeds
+    runs: int = (
+        0  #: how often a study that draws nothing is run, in turn in one process; 0 for seeds
+    )
     needs: Mapping[str, Callable[[], None]] = field(default_factory=dict)
     """By group, what raises ``MissingDependency`` if it cannot be run."""
 

@@ -224,7 +224,7 @@ class Pilot:
                 raise ModeError(f"move() during a goal ({goal.name}): end it by stop()")
             if mode is not Mode.WALKING:
                 raise ModeError(f"move() needs walking mode, not {mode.value}: call walk() first")
-            if command != ZERO_COMMAND:
+            if command != ZERO_COMMAND and self.command == ZERO_COMMAND:
                 self._asked_at = self._loop.state.time
             return self._walker.follow(command, pose)
 

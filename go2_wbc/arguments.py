@@ -159,7 +159,10 @@ def _fits(value: object, kind: object) -> bool:
 
 def _is_possible(path: Path | str) -> bool:
     """Whether a file can have this path."""
-    names = os.fsencode(path).split(b"/")
+    try:
+        names = os.fsencode(path).split(b"/")
+    except UnicodeEncodeError:  # half of a pair of surrogates
+        return False
     return b"\0" not in b"".join(names) and max(map(len, names)) <= _LONGEST_NAME
 
 

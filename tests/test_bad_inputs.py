@@ -56,7 +56,7 @@ PACKAGES = ("go2_wbc", "controller", "motions", "viz")
 LONGEST = 5.0  # s of CPU; a refusal takes no time
 HUGE = (1e300, -1e300, 10**400)
 NUMBERS = ("three", None, [], True, math.nan, math.inf, np.zeros(2), *HUGE)
-NO_PATHS = ("", 300 * "n", "a\0b")  # no file system has these
+NO_PATHS = ("", 300 * "n", "a\0b", "\ud800")  # no file system has these
 BAD: dict[object, tuple[object, ...]] = {
     float: NUMBERS,
     int: ("three", None, [], math.nan, 1.5, 10**400, -(10**400)),

@@ -124,7 +124,7 @@ def new(
         raise CommandError(f"NAME must be a Python name such as my_motion, got {name!r}")
     suffix = ".xml" if scene else ".py"
     shown = out / f"{name}{suffix}"
-    if shown.exists():
+    if shown.expanduser().exists():
         raise ConfigError(f"{shown} exists already: choose another name")
     if not scene and (name in sys.stdlib_module_names or find_spec(name) is not None):
         raise CommandError(f"{name}.py would hide the module {name!r}: choose another name")

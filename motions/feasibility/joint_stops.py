@@ -22,6 +22,7 @@ from go2_wbc.legs import LEGS
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.config import Gains, WbcConfig
+from motions.batch_kinematics import attitudes
 from motions.feasibility.forces import JOINTS, Case
 from motions.feasibility.report import Series
 
@@ -54,6 +55,18 @@ def joint_position(case: Case) -> Series:
     counted = np.where(near, 0.0, np.minimum(margins, -far))
     margins = np.where(margins < 0.0, counted, margins)
     return Series("joint position", "rad", JOINTS, motion.times, q, bounds, margins, TIGHT_ANGLE)
+
+
+def sinking(case: Case) -> Float[np.ndarray, " n"]:
+    """How much lower [m] the trunk is at each sample, as joints of standing legs stay at stops."""
+    motion, model = case.path, case.model
+    q, lower = motion.q[:, 7:], np.zeros(len(motion.times))
+    beyond = np.flatnonzero(((q < model.q_lower) | (q > model.q_upper)).any(axis=1))
+    if len(beyond):
+        asked = np.stack([foot_places(*one) for one in _legs(q[beyond], model)], 1)
+        p = trunk_at_stops(asked, motion.stance[beyond], WbcConfig().body_position, model)
+        lower[beyond] = -(attitudes(motion.rpy[beyond])[:, 2] * p).sum(axis=1)
+    return lower
 
 
 def _stretching(model: RobotModel) -> float:

@@ -16,6 +16,7 @@ from go2_wbc.reference import Anchor
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from motions.feasibility.bodies import LinkHulls
 from motions.feasibility.forces import FEET, JOINTS, Case
+from motions.feasibility.joint_stops import sinking
 from motions.feasibility.report import Series
 from motions.postures import home_poses
 
@@ -55,7 +56,7 @@ def clearance(case: Case, hulls: LinkHulls) -> Series:
     A foot in the air that is to be below the ground stays above, and its calf with it: that may be
     lower by as much. In solved parts a foot that lifts off stands until then: where it sinks in the
     last step of a push-off, by half the square of the step times its J' v, that is the planner's
-    integration.
+    integration. Trunk and hips are as low as joints at their stops leave them.
     """
     motion, limits = case.path, case.limits
     feet = case.places[:, :, 2] - case.model.foot_radius
@@ -70,6 +71,7 @@ def clearance(case: Case, hulls: LinkHulls) -> Series:
     for calf in calves:
         floor[:, calf] += sunk[:, Leg[hulls.names[calf].partition(" ")[0]]]
     values = np.hstack([links, feet])
+    values[:, [part in ("trunk", "hip") for part in [*parts, *FEET]]] -= sinking(case)[:, None]
     is_checked = np.ones_like(values, dtype=bool)
     stood = np.vstack([motion.stance[:1], motion.stance[:-1]]) & motion.is_dynamic[:, None]
     is_checked[:, count:] = ~(motion.stance | stood)

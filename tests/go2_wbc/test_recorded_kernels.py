@@ -19,6 +19,7 @@ from go2_wbc.planning.height_map import HeightMap
 from go2_wbc.records import Record, _looking_at, layout_of, packed
 from go2_wbc.reference import Target
 from go2_wbc.robot.estimator import StateEstimator
+from go2_wbc.robot.latency import LAGS, Lag
 from go2_wbc.robot.motor import JointFriction
 from go2_wbc.robot.payload_estimation import PayloadEstimator
 from go2_wbc.robot.state import Snapshot
@@ -164,7 +165,10 @@ class Draw:
             row = rng.uniform(0.0, 1.0, size) * rng.choice([1.0, -0.3], size)
             whole = rng.random(size) < 0.3  # flags and counts
             row[whole] = rng.integers(0, 3, np.count_nonzero(whole))
-            return _looking_at(kind, row)
+            record = _looking_at(kind, row)
+            if kind is Lag:  # else no command is late
+                record.ticks, record.known = rng.integers(LAGS), LAGS
+            return record
 
 
 def undecided(kind: type) -> None:

@@ -146,6 +146,8 @@ def _member(kind: type, name: str) -> dict[str, str] | None:
     value = inspect.getattr_static(kind, name)
     if isinstance(value, staticmethod | classmethod):
         value = getattr(kind, name)
+    if inspect.isbuiltin(value) or inspect.ismethoddescriptor(value):
+        return None  # of a text, say: Python's own have no signature before 3.13
     return signature(value) if inspect.isroutine(value) else None
 
 

@@ -249,9 +249,15 @@ def _place(model: mujoco.MjModel, data: mujoco.MjData, layout: MujocoLayout, yaw
     tops = [np.array([x, y, _RAY_TOP]) for x in _FOOTPRINT for y in _FOOTPRINT]
     distances = [mujoco.mj_ray(model, data, top, down, None, True, -1, geom) for top in tops]
     found = [_RAY_TOP - distance for distance in distances if distance >= 0.0]
-    if not found:
+    if not (found or _has_floor(model)):
         raise ModelMismatch("there is no ground at x = y = 0, where the robot begins lying")
-    base_q[2] = max(found) + _DROP_HEIGHT
+    base_q[2] = max(found, default=0.0) + _DROP_HEIGHT
+
+
+def _has_floor(model: mujoco.MjModel) -> bool:
+    """Whether a plane collides: unseen, and beyond what is drawn of it, no ray meets it."""
+    collides = (model.geom_contype | model.geom_conaffinity).astype(bool)
+    return bool((collides & (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)).any())
 
 
 def _kept_file(model: mujoco.MjModel, data: mujoco.MjData, resting: JointCommand) -> Path | None:

@@ -262,11 +262,10 @@ def _option_problems(model: mujoco.MjModel) -> list[str]:
         for flag, what in _NEEDED.items()
         if model.opt.disableflags & flag
     ]
-    gravity = float(np.linalg.norm(model.opt.gravity))
-    if abs(gravity / GRAVITY - 1.0) > GRAVITY_SLACK:
-        problems.append(
-            f"its gravity is {gravity:.2f} m/s^2, the controller reckons with {GRAVITY}"
-        )
+    size, upward = float(np.linalg.norm(model.opt.gravity)), float(model.opt.gravity[2])
+    if abs(size / GRAVITY - 1.0) > GRAVITY_SLACK or upward >= 0.0:
+        told = f"{size:.2f} m/s^2{' upward' if upward > 0.0 else ''}"
+        problems.append(f"its gravity is {told}, the controller reckons with {GRAVITY} downward")
     return problems
 
 

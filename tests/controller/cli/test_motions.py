@@ -140,7 +140,9 @@ def test_a_new_motion_is_feasible_is_not_written_twice_and_is_told_to_a_program(
     run("check", path)
     before = path.read_bytes()
     monkeypatch.syspath_prepend(tmp_path)  # as with python -m controller.cli, from that folder
-    assert "exists already" in run("new", "greet", "--out", tmp_path, code=ExitCode.USAGE).err
+    monkeypatch.setenv("HOME", str(tmp_path.parent))  # a shell leaves ~ as it is behind --out=
+    for folder in (tmp_path, f"~/{tmp_path.name}"):
+        assert "exists already" in run("new", "greet", "--out", folder, code=ExitCode.USAGE).err
     assert path.read_bytes() == before
     told = json.loads(run("export", path, "--out", table, "--json").out)
     assert told == {"motion": "greet", "file": str(table), "rows": told["rows"]}

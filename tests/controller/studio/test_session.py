@@ -211,7 +211,7 @@ def test_a_chosen_parameter_is_no_edit(studio: Studio, file: Path) -> None:
 
 
 def test_a_motion_that_cannot_be_done_is_made_possible(studio: Studio, file: Path) -> None:
-    assert "error" not in _edit(studio, 0, op="set", name="pitch", value=40.0)
+    assert "error" not in _edit(studio, 0, op="set", name="pitch", value=46.0)
     changes = studio.mend({})["changes"]
     assert isinstance(changes, tuple)
     call, _ = changes[0]

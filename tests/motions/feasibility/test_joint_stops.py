@@ -12,7 +12,8 @@ from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.config import WbcConfig
-from motions import Timeline, compile_timeline
+from motions import Timeline, compile_timeline, deg
+from motions.feasibility.check import FeasibilityChecker
 from motions.feasibility.joint_stops import joint_position, trunk_at_stops
 from motions.plan.trajectory import Trajectory, trajectory_of
 from tests.motions.feasibility.cases import case_of
@@ -114,3 +115,12 @@ def test_hips_of_two_standing_legs_stay_clear_of_their_stops(
         q[10:20, 7 + hip] = model.q_upper[hip] - room
         series = joint_position(case_of(replace(leaning, q=q, stance=feet), model))
         assert series.is_broken == is_broken, room
+
+
+def test_a_trunk_off_its_plan_at_stops_is_as_low_as_it_is_then(model: RobotModel) -> None:
+    """Pitched by 38 deg the nose met the ground in 8 of 8 runs, at a chance of 91 %; by 37 in 0."""
+    checker = FeasibilityChecker(model)
+    for pitch, names in ((37.0, []), (38.0, ["clearance"])):
+        line = Timeline().body(pitch=deg(pitch), over=0.6).home(over=0.6)
+        report = checker.check(compile_timeline(line, model))
+        assert [finding.check for finding in report.failures] == names

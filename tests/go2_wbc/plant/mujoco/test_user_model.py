@@ -100,6 +100,15 @@ def test_a_scene_without_ground_below_the_robot_is_refused(users_mjcf: Mjcf) -> 
         MujocoPlant(users_mjcf(edit))
 
 
+def test_a_plane_is_ground_also_unseen_and_beyond_what_is_drawn_of_it(users_mjcf: Mjcf) -> None:
+    def edit(spec: mujoco.MjSpec) -> None:
+        floor = spec.geom(FLOOR)
+        floor.rgba, floor.material, floor.pos = [0.0] * 4, "", [3.0, 0.0, 0.0]
+        floor.size = [2.0, 2.0, 0.1]
+
+    assert MujocoPlant(users_mjcf(edit)).read().q[2] < 0.2
+
+
 def test_motors_and_floor_are_added_and_the_tighter_motor_limit_wins(users_mjcf: Mjcf) -> None:
     def edit(spec: mujoco.MjSpec) -> None:
         delete_actuators(spec)
@@ -295,6 +304,10 @@ def disable_contacts(spec: mujoco.MjSpec) -> None:
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
 
 
+def fall_upward(spec: mujoco.MjSpec) -> None:
+    spec.option.gravity = [0, 0, 9.81]
+
+
 def go_to_the_moon(spec: mujoco.MjSpec) -> None:
     spec.option.gravity = [0.0, 0.0, -1.62]
 
@@ -312,7 +325,8 @@ FAULTS: list[tuple[Edit, str]] = [
     (make_heavy, "it weighs 31.1 kg, the robot that is controlled 16.1 kg"),
     (flip_axis, "RL_thigh_joint turns about (0.00, -1.00, 0.00) of the base, not (0, 1, 0)"),
     (disable_contacts, "its <option> disables contacts"),
-    (go_to_the_moon, "its gravity is 1.62 m/s^2, the controller reckons with 9.81"),
+    (go_to_the_moon, "its gravity is 1.62 m/s^2, the controller reckons with 9.81 downward"),
+    (fall_upward, "its gravity is 9.81 m/s^2 upward, the controller"),
     (take_radians_for_degrees, 'it needs <compiler angle="radian"/>'),
 ]
 
