@@ -65,7 +65,7 @@ def sinking(case: Case) -> Float[np.ndarray, " n"]:
     if len(beyond):
         asked = np.stack([foot_places(*one) for one in _legs(q[beyond], model)], 1)
         p = trunk_at_stops(asked, motion.stance[beyond], WbcConfig().body_position, model)
-        lower[beyond] = -(attitudes(motion.rpy[beyond])[:, 2] * p).sum(axis=1)
+        lower[beyond] = np.maximum(-(attitudes(motion.rpy[beyond])[:, 2] * p).sum(axis=1), 0.0)
     return lower
 
 
