@@ -24,7 +24,8 @@ from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Rule, between, ranged
 
 STEEPEST = 0.8
 """Greatest angle [rad] of a slope: steeper than any friction coefficient up to 1 holds."""
-MOST = 10_000  #: Of boxes, steps, blocks, waves or rows: MuJoCo builds a million for minutes
+MOST = 10_000
+"""Most boxes, steps, blocks, waves and rows of stones: MuJoCo builds a million for minutes."""
 COUNTED = between(1, MOST)
 CLIMBED = Rule(f"above 0, at most {STEEPEST} rad", lambda angle: 0.0 < angle <= STEEPEST)
 
