@@ -40,7 +40,7 @@ from go2_wbc.wbc.solvers import is_grave
 
 _log = logging.getLogger(__name__)
 
-STATE_SIZES = {"q": 19, "v": 18, "tau": 12, "foot_forces": 4}
+STATE_SIZES = {"q": 19, "v": 18, "tau": 12, "foot_forces": 4, "feet_in_contact": 4}
 OLDEST_SCAN = 64  #: Ticks by which a scan may be late
 
 
@@ -204,6 +204,8 @@ class ControlLoop:
 
     def _take(self, state: RobotState) -> bool:
         is_finite = _is_plausible(state)
+        if state.feet_in_contact.dtype != bool:
+            raise TypeError(state.feet_in_contact.dtype)
         if is_finite and state.time > self.state.time:
             self._unanswered = 0
             self.state = state
@@ -352,10 +354,10 @@ def _require_state(plant: Plant, state: RobotState) -> None:
     if not isinstance(state, RobotState):
         raise PlantError(f"{told}, got {state!r:.80}")
     for name, size in STATE_SIZES.items():
-        part = getattr(state, name)
-        if not (isinstance(part, np.ndarray) and part.shape == (size,) and part.dtype == float):
+        part, kind = getattr(state, name), np.dtype(bool if name == "feet_in_contact" else float)
+        if not (isinstance(part, np.ndarray) and part.shape == (size,) and part.dtype == kind):
             given = f"{np.shape(part)} of {getattr(part, 'dtype', type(part).__name__)}"
-            raise PlantError(f"{told} with {name} of shape ({size},) of float64, got {given}")
+            raise PlantError(f"{told} with {name} of shape ({size},) of {kind}, got {given}")
 
 
 def _is_plausible(state: RobotState) -> bool:

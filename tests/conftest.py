@@ -6,6 +6,7 @@ repetitions in long loops are checked now and again only (see ``tests/typechecke
 """
 
 import gc
+import logging
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -93,8 +94,11 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_runtest_setup() -> None:
-    """Checks the first calls of every test's fixtures."""
+    """Checks the first calls of every test's fixtures; loggers say what they say by default."""
     typechecker.renew()
+    for name in PACKAGES:  # a command of a test before may have told them to say more
+        logging.getLogger(name).setLevel(logging.NOTSET)
+    logging.getLogger().setLevel(logging.WARNING)
 
 
 def pytest_runtest_call() -> None:

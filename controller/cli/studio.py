@@ -47,8 +47,8 @@ def run(
 
     path, name = _file_of(motion)
     usual = signal.signal(signal.SIGTERM, signal.default_int_handler)  # it ends its processes, too
-    with Studio(path, name, live.port) as studio:
-        try:
+    try:
+        with Studio(path, name, live.port) as studio:
             if json:
                 print_json_line({"url": studio.url, "file": str(path)})
             else:
@@ -63,10 +63,10 @@ def run(
                     print(told or "all jumps are solved")
                 time.sleep(POLL_PERIOD)
                 studio.look()
-        except KeyboardInterrupt:
-            return ExitCode.OK
-        finally:
-            signal.signal(signal.SIGTERM, usual)
+    except KeyboardInterrupt:
+        return ExitCode.OK
+    finally:
+        signal.signal(signal.SIGTERM, usual)
 
 
 def _file_of(word: str) -> tuple[Path, str | None]:

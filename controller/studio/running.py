@@ -9,8 +9,10 @@ from __future__ import annotations
 import os
 import threading
 import time
+import weakref
 from collections.abc import Callable
 from contextlib import suppress
+from multiprocessing.process import BaseProcess
 from typing import cast, final
 
 from controller.studio.orders import Answer, Doing, Order
@@ -46,6 +48,7 @@ class Runner:
         environment = {**os.environ, **ONE_THREAD}  # more threads would wait for each other, busily
         arguments = (there, self._stop, environment)
         self._process = context.Process(target=serve, args=arguments, daemon=True)
+        weakref.finalize(self, _kill, self._process)  # ahead of what one that still loads needs
         start(self._process, *PRELOADED)
         there.close()
         self._is_warm = False
@@ -109,6 +112,11 @@ class Runner:
         self._end()
 
     def _end(self) -> None:
-        self._process.kill()
+        _kill(self._process)
         self._process.join()
         self._pipe.close()
+
+
+def _kill(process: BaseProcess) -> None:
+    if process.is_alive():
+        process.kill()

@@ -22,14 +22,14 @@ import traceback
 from abc import ABC, abstractmethod
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from multiprocessing import connection, resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from types import ModuleType
+from types import FrameType, ModuleType
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, final
 
 if TYPE_CHECKING:
@@ -329,6 +329,23 @@ def processes() -> ForkServerContext | SpawnContext:
     return multiprocessing.get_context("forkserver" if sys.platform == "linux" else "spawn")
 
 
+@contextmanager
+def _later_interrupts() -> Generator[None]:
+    """Ctrl-C comes behind the block: another thread may take a signal that this one masks."""
+    usual = signal.getsignal(signal.SIGINT)
+    if not callable(usual) or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came = list[tuple[int, FrameType | None]]()
+    signal.signal(signal.SIGINT, lambda *how: came.append(how))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
+        if came:
+            usual(*came[0])
+
+
 def start(process: BaseProcess, *modules: str) -> None:
     """Start a process with the environment of a worker, and before the first one the fork server.
 
@@ -337,7 +354,7 @@ def start(process: BaseProcess, *modules: str) -> None:
     hidden, which a worker would run again. Ctrl-C has to wait, in the process, too: the server
     would end with a traceback.
     """
-    with STARTING:
+    with STARTING, _later_interrupts():
         multiprocessing.set_forkserver_preload([*LOADED, *modules])
         resource_tracker.ensure_running()  # it lets Ctrl-C in again when it starts
         main, before = sys.modules["__main__"], dict(os.environ)

@@ -24,7 +24,7 @@ from go2_wbc.records import Array3, Array3x3, Array4, Array4x3, Array12, Array18
 from go2_wbc.robot.description import RobotProfile, find_profile
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class RobotState:
     """The measured state of the robot at one instant.
 
@@ -45,6 +45,12 @@ class RobotState:
     tau: Array12
     foot_forces: Array4
     feet_in_contact: Bool[np.ndarray, "4"]
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, RobotState):
+            return NotImplemented
+        names = [part.name for part in fields(self)]
+        return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in names)
 
     def __repr__(self) -> str:
         place = ", ".join(f"{part:.3f}" for part in self.p_world_base.tolist())

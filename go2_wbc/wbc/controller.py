@@ -46,6 +46,7 @@ from go2_wbc.wbc.tasks import BuiltInTasks, Task
 
 GREATEST_EXTRA_WEIGHT = 1e4
 """Weight of a user's own task beyond which nothing is left of the others' accuracy."""
+GREATEST_NUMBER = 1e100  #: In a task's rows: they are squared, and summed
 BACKENDS = ("condensed", "full", "placo")  #: Names of the back ends, the usual one first
 _IN_BODY = frozenset(BodyTarget.__dataclass_fields__)
 _IN_STATE = ("q", "v")
@@ -216,11 +217,12 @@ class WholeBodyController:
         task_rows = [task.rows(snapshot, reference) for task in self.tasks]
         equality_rows = [item.rows(snapshot, reference) for item in self.equalities]
         bounds = [item.bounds(snapshot, reference) for item in self.inequalities]
+        tasks = stacked(task_rows, self.tasks)
         task_counts = [len(rows.b) for rows in task_rows]
         return Problem(
             snapshot=snapshot,
             reference=reference,
-            tasks=stacked(task_rows, self.tasks),
+            tasks=tasks,
             weights=np.repeat([task.weight_at(reference) for task in self.tasks], task_counts),
             equalities=stacked(equality_rows, self.equalities),
             bounds=Bounds(*(np.concatenate(parts) for parts in zip(*bounds, strict=True))),
@@ -301,7 +303,7 @@ class WholeBodyController:
         extra = _NO_ROWS
         if self._extra_tasks:
             extra = self._extra_rows(snapshot, reference)
-            if not np.isfinite(extra).all():
+            if not (np.abs(extra) <= GREATEST_NUMBER).all():
                 return None
         decision = Decision.of(np.empty(_DECISION))
         target: Any = reference  # has the row of a ``Target``
@@ -363,7 +365,7 @@ def check_problem(problem: Problem, solver: str) -> None:
     """
     tasks, equalities, (C, lower, upper) = problem.tasks, problem.equalities, problem.bounds
     parts = [
-        np.isfinite(tasks.A).all(axis=1) & np.isfinite(tasks.b),
+        (np.abs(tasks.A) <= GREATEST_NUMBER).all(axis=1) & (np.abs(tasks.b) <= GREATEST_NUMBER),
         np.isfinite(equalities.A).all(axis=1) & np.isfinite(equalities.b),
         np.isfinite(C).all(axis=1) & (lower < np.inf) & (upper > -np.inf),
     ]
@@ -371,19 +373,25 @@ def check_problem(problem: Problem, solver: str) -> None:
     if len(bad):
         source = int(np.searchsorted(np.cumsum(problem.counts), bad[0], side="right"))
         name = problem.sources[source].name
-        raise QpInfeasible(solver, f"the rows of {name!r} are not finite")
+        raise QpInfeasible(solver, f"the rows of {name!r} are not finite, or too great to square")
 
 
-def stacked(rows: Sequence[Rows], sources: Sequence[Source]) -> Rows:
+def stacked(rows: Sequence[object], sources: Sequence[Source]) -> Rows:
     """The rows of several tasks or constraints, one below the other.
 
     Raises:
-        ConfigError: for rows that are no (k, 30) and (k,).
+        ConfigError: for rows that are no (k, 30) and (k,) of numbers.
     """
+    parts = list[Rows]()
     for part, source in zip(rows, sources, strict=True):
-        if np.shape(part.b) != (len(part.b),) or np.shape(part.A) != (len(part.b), SIZE):
+        if not isinstance(part, Rows) or not {np.asarray(x).dtype.kind for x in part} <= set("bif"):
+            given = " ".join(repr(part).split())
+            raise ConfigError(f"rows() of {source.name!r} must give Rows(A, b), got {given:.80}")
+        A, b, count = np.shape(part.A), np.shape(part.b), np.size(part.b)
+        if b != (count,) or (count, SIZE) != A:
             raise ConfigError(
-                f"{source.name!r} has rows of the shapes {np.shape(part.A)} and "
-                f"{np.shape(part.b)}, wanted are (k, {SIZE}) and (k,)"
+                f"{source.name!r} has rows of the shapes {A} and {b}, wanted are (k, {SIZE}) and "
+                "(k,)"
             )
-    return Rows(np.concatenate([r.A for r in rows]), np.concatenate([r.b for r in rows]))
+        parts.append(part)
+    return Rows(np.concatenate([r.A for r in parts]), np.concatenate([r.b for r in parts]))

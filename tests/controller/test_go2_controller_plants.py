@@ -162,6 +162,7 @@ for wrong in (
     lambda state: replace(state, q=state.q[:18]),
     lambda state: replace(state, v=state.v.astype("f4")),
     lambda state: replace(state, tau=[0.0] * 12),
+    lambda state: replace(state, feet_in_contact=state.foot_forces),
 ):
     plant = WatchedPlant()
     with GO2Controller(plant=plant) as go2:
@@ -185,6 +186,7 @@ def test_what_is_no_state_is_told_with_the_plant_that_gave_it(tmp_path: Path) ->
         " with q of shape (19,) of float64, got (18,) of float64",
         " with v of shape (18,) of float64, got (18,) of float32",
         " with tau of shape (12,) of float64, got (12,) of list",
+        " with feet_in_contact of shape (4,) of bool, got (4,) of float64",
     ]
     lines = done.stdout.splitlines()
     assert [line.split("WatchedPlant.read() must give a RobotState") for line in lines] == [

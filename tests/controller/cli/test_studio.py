@@ -50,8 +50,10 @@ def test_a_motion_of_the_library_is_copied_here(
 def test_a_file_that_is_no_motion_is_told(tmp_path: Path, run: Run) -> None:
     file = tmp_path / "greet.py"
     file.write_text("def greet(:\n", encoding="utf-8")
+    before = signal.getsignal(signal.SIGTERM)
     told = run("studio", file, "--no-open", "--port", 0, code=ExitCode.RUNTIME).err
     assert "greet.py, line 1: SyntaxError" in told
+    assert signal.getsignal(signal.SIGTERM) is before
 
 
 @pytest.mark.parametrize("no_open", [False, True])

@@ -1,6 +1,7 @@
 """What the process that runs an author's file tells, and how it plays: without a process."""
 
 import math
+import signal
 import sys
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
@@ -25,6 +26,7 @@ from controller.studio import jumping, nearness, working, writing_out
 from controller.studio.grounds import PlayedGround
 from controller.studio.making import OURS, Maker
 from controller.studio.orders import AT_ONCE, STOPPED, Answer, Bar, Cut, Doing, Order, Task, TooLong
+from controller.studio.running import Runner
 from controller.studio.source import Source
 from controller.studio.working import Teller
 from go2_wbc.errors import StudioError
@@ -450,3 +452,9 @@ def test_a_motion_beside_the_library_leaves_the_library_as_it_is() -> None:
     finally:
         sys.modules.update(known)
     assert not {name for name in new if name.partition(".")[0] in OURS}
+
+
+def test_the_process_of_a_runner_that_nobody_holds_ends_at_once() -> None:
+    process = Runner()._process
+    process.join(60.0)
+    assert process.exitcode == -signal.SIGKILL

@@ -5,13 +5,17 @@ import pickle
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable
+from multiprocessing.process import BaseProcess
 from pathlib import Path
+from typing import cast
+from unittest.mock import Mock
 
 import pytest
 
 from controller import sweep
-from controller.sweeps.engine import Worker, order_of
+from controller.sweeps.engine import Worker, order_of, start
 from controller.sweeps.sweep_file import Row
 from tests.controller.sweeps import swept
 from tests.script_server import python
@@ -102,3 +106,23 @@ def test_where_nothing_forks_every_worker_is_started_anew(
     monkeypatch.setattr(sys, "platform", "darwin")
     assert sweep(swept.trial, 3, workers=2, out=tmp_path / "b.sqlite").rows == forked
     assert asked(swept.process, tmp_path)["parent"] == os.getpid()
+
+
+def test_ctrl_c_waits_until_a_process_has_started_whichever_thread_takes_the_signal() -> None:
+    is_over, reached = threading.Event(), list[str]()
+    other = threading.Thread(target=is_over.wait)
+    other.start()
+
+    def begin() -> None:
+        signal.pthread_kill(cast("int", other.ident), signal.SIGINT)
+        time.sleep(0.1)
+        reached.append("the end")
+
+    process = Mock(spec=BaseProcess, start=begin)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            start(process)
+    finally:
+        is_over.set()
+        other.join()
+    assert reached == ["the end"]

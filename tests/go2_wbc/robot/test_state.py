@@ -57,6 +57,18 @@ def test_parts_of_a_state_are_pinocchios_and_its_pitch_at_the_pole_is_finite() -
     np.testing.assert_array_equal(state.joint_velocities, np.arange(6.0, 18.0))
 
 
+def test_states_are_equal_whose_numbers_all_are() -> None:
+    state = random_state(np.random.default_rng(0))
+    assert state == state.read_only()
+    assert state != state.q.tolist()
+    for name in ("q", "v", "tau", "foot_forces"):
+        other = getattr(state, name).copy()
+        other[-1] += 1e-9
+        assert state != replace(state, **{name: other}), name
+    assert state != replace(state, time=state.time + 1e-3)
+    assert state != replace(state, feet_in_contact=~state.feet_in_contact)
+
+
 def test_a_torque_command_has_no_servo_and_a_servo_no_torque() -> None:
     tau = np.arange(12.0)
     torque = JointCommand.torque(tau)

@@ -5,7 +5,7 @@ Nothing here may hang, end in torques that are no numbers, or be noticed by one 
 
 import re
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -331,9 +331,29 @@ def test_a_task_of_ones_own_with_rows_of_another_shape_is_refused(
         wbc.solve(*standing(MODEL), relax=True)
 
 
+@pytest.mark.parametrize(
+    ("rows", "told"),
+    [
+        (None, "None"),
+        ((np.zeros((1, SIZE)), np.zeros(1)), r"\(array\(\[\[0"),
+        (Rows(np.full((1, SIZE), None), np.zeros(1)), r"Rows\(A=array\(\[\[None, None"),
+        (Rows(np.zeros((1, SIZE)), np.zeros(1, complex)), r"Rows\(A=array\(\[\[0"),
+    ],
+)
+@pytest.mark.parametrize("solver", ["active_set", "proxqp"])
+def test_a_task_of_ones_own_that_gives_no_rows_is_refused(
+    solver: str, rows: object, told: str
+) -> None:
+    wbc = WholeBodyController(
+        MODEL, config=WbcConfig(solver=solver), extra_tasks=[OwnTask(rows_given=cast("Rows", rows))]
+    )
+    with pytest.raises(ConfigError, match=rf"rows\(\) of 'own' must give Rows\(A, b\), got {told}"):
+        wbc.solve(*standing(MODEL), relax=True)
+
+
 @pytest.mark.parametrize("solver", ["active_set", "daqp", "quadprog", "proxqp"])
 @pytest.mark.parametrize("part", ["A", "b"])
-@pytest.mark.parametrize("value", NOT_FINITE)
+@pytest.mark.parametrize("value", [*NOT_FINITE, -1e101])
 def test_a_task_of_ones_own_that_is_not_finite_is_refused_by_name(
     solver: str, part: str, value: float
 ) -> None:
