@@ -149,13 +149,7 @@ class Benchmark:
         return studies
 
     def _report(
-        self,
-        studies: Sequence[Study],
-        seeds: int,
-        output: Output,
-        *,
-        jobs: int,
-        resume: bool,
+        self, studies: Sequence[Study], seeds: int, output: Output, *, jobs: int, resume: bool
     ) -> int:
         """List the metrics without a seed; else run them, print and write the report."""
         if not seeds:

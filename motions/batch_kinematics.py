@@ -13,13 +13,7 @@ from jaxtyping import Bool, Float
 
 from go2_wbc.legs import LEGS
 from go2_wbc.robot import leg_kinematics
-from go2_wbc.robot.leg_kinematics import (
-    LegGeometry,
-    foot_places,
-    leg_table,
-    link_table,
-    settle,
-)
+from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_table, link_table, settle
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import quaternions_from_rpy, rotations_from_rpy
 from motions.memory import Memory, Rows, by_rows

@@ -225,9 +225,5 @@ def trot_against(snapshot: Snapshot, offset: tuple[float, float]) -> Gait:
     )
     offsets = STEPS.offsets if usual >= mirrored else MIRRORED_OFFSETS
     return replace(
-        STEPS,
-        period=FIRST_PERIOD,
-        duty=FIRST_DUTY,
-        offsets=offsets,
-        starts_at_once=True,
+        STEPS, period=FIRST_PERIOD, duty=FIRST_DUTY, offsets=offsets, starts_at_once=True
     )

@@ -21,13 +21,7 @@ from controller.cli.common import (
     shown_path,
     video_file,
 )
-from controller.cli.motion_args import (
-    MotionSource,
-    MotionWord,
-    Settings,
-    print_verdict,
-    the_motion,
-)
+from controller.cli.motion_args import MotionSource, MotionWord, Settings, print_verdict, the_motion
 from go2_wbc.errors import Go2WbcError
 
 if TYPE_CHECKING:

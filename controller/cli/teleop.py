@@ -49,11 +49,7 @@ def run(
     print(keys_help(), said, *([] if pad is None else [LEGEND]), sep="\n")
     numbers = read_config(config).beside_hardware
     simulator = MujocoPlant(
-        mjcf,
-        robot=numbers.robot,
-        motor=numbers.motor,
-        sensors=sensors,
-        estimator=numbers.estimator,
+        mjcf, robot=numbers.robot, motor=numbers.motor, sensors=sensors, estimator=numbers.estimator
     )
     with (
         closing(simulator) as plant,

@@ -253,12 +253,7 @@ DEMO_STEPS: tuple[DemoStep, ...] = (
 TERRAINS: Mapping[str, Terrain] = {
     "stairs": Stairs(0.16, 4, 0.31, way=BOTH, landing=1.2),
     "course": Course(
-        (
-            Stairs(0.15, 3, 0.31, way=BOTH, landing=1.0),
-            Blocks(0.18, count=1),
-            Stones(),
-            Gap(0.2),
-        )
+        (Stairs(0.15, 3, 0.31, way=BOTH, landing=1.0), Blocks(0.18, count=1), Stones(), Gap(0.2))
     ),
 }
 """What a robot that sees can be shown on, by name."""

@@ -21,17 +21,7 @@ import numpy as np
 from controller.studio import worlds
 from controller.studio.grounds import PlayedGround
 from controller.studio.literals import Run
-from controller.studio.orders import (
-    AT_ONCE,
-    STOPPED,
-    Answer,
-    Bar,
-    Cut,
-    Doing,
-    Order,
-    Task,
-    TooLong,
-)
+from controller.studio.orders import AT_ONCE, STOPPED, Answer, Bar, Cut, Doing, Order, Task, TooLong
 from controller.studio.plain import coarsely, in_words, is_unsolved, plainly
 from controller.studio.source import Slot, Source
 from controller.studio.splitting import split

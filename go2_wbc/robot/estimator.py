@@ -53,15 +53,7 @@ import pinocchio as pin
 from go2_wbc.algebra.linear import cross, triple
 from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.legs import LEGS
-from go2_wbc.records import (
-    Array3,
-    Array3x3,
-    Array4x3,
-    Array18,
-    Array19,
-    Record,
-    packed,
-)
+from go2_wbc.records import Array3, Array3x3, Array4x3, Array18, Array19, Record, packed
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.foot_odometry import Foot, Level, follow_foot, see_foot, see_ground, take_in_leg
 from go2_wbc.robot.footprints import FAR

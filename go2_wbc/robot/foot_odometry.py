@@ -36,14 +36,7 @@ from go2_wbc.records import Array3, Array3x3, Record
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.footprints import EACH, plane_near
 from go2_wbc.robot.leg_kinematics import LegGeometry
-from go2_wbc.robot.state_filter import (
-    FEET,
-    THETA,
-    VELOCITY,
-    Filter,
-    take_in,
-    take_in_one,
-)
+from go2_wbc.robot.state_filter import FEET, THETA, VELOCITY, Filter, take_in, take_in_one
 
 LEAST_TRUST = 1e-3
 """Trust in a foot in the air: its place drifts a thousand times as fast as a standing one's."""

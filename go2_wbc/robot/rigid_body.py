@@ -417,11 +417,7 @@ def fill_snapshot(
     now.mass_matrix[:], now.J_feet[:], now.J_contacts[:], now.com_shift[:] = 0.0, 0.0, 0.0, 0.0
     R = now.R_world_base
     rotation_of(q[3], q[4], q[5], q[6], R)
-    base = (
-        (R[0, 0], R[1, 0], R[2, 0]),
-        (R[0, 1], R[1, 1], R[2, 1]),
-        (R[0, 2], R[1, 2], R[2, 2]),
-    )
+    base = ((R[0, 0], R[1, 0], R[2, 0]), (R[0, 1], R[1, 1], R[2, 1]), (R[0, 2], R[1, 2], R[2, 2]))
     gravity, w = robot.gravity, triple(now.v[3:6])
     up = gravity * R[2, 0], gravity * R[2, 1], gravity * R[2, 2]
     acceleration = plus(up, cross(w, triple(now.v[:3])))

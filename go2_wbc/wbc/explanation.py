@@ -180,10 +180,7 @@ def _ranked(found: list[tuple[BindingLimit, float]]) -> list[tuple[BindingLimit,
     least = ALIKE * max((limit.cost for limit, _ in found), default=0.0)
     dear = [pair for pair in found if pair[0].cost >= least]
     rest = [pair for pair in found if pair[0].cost < least]
-    return [
-        *sorted(dear, key=lambda pair: -pair[1]),
-        *sorted(rest, key=lambda pair: -pair[0].cost),
-    ]
+    return [*sorted(dear, key=lambda pair: -pair[1]), *sorted(rest, key=lambda pair: -pair[0].cost)]
 
 
 def multipliers_of(problem: Problem, *, is_relaxed: bool = False) -> Multipliers:

@@ -82,11 +82,7 @@ class Problem:
         value = self.bounds.C @ z
         excess = np.maximum(np.maximum(self.bounds.lower - value, value - self.bounds.upper), 0.0)
         errors = np.concatenate(
-            [
-                self.tasks.A @ z - self.tasks.b,
-                self.equalities.A @ z - self.equalities.b,
-                excess,
-            ]
+            [self.tasks.A @ z - self.tasks.b, self.equalities.A @ z - self.equalities.b, excess]
         )
         pieces = np.split(np.abs(errors), np.cumsum(self.counts)[:-1])
         return tuple(

@@ -147,9 +147,7 @@ def solve_dense_qp(qp: DenseQp, solver: str) -> Float[np.ndarray, " n"]:
     return x
 
 
-def solve_with_multipliers(
-    qp: DenseQp,
-) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " m"]]:
+def solve_with_multipliers(qp: DenseQp) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " m"]]:
     """The minimiser by our active set, and the multiplier of each inequality (``solve_qp``).
 
     Raises:

@@ -159,13 +159,7 @@ class BodyAndFeet(TimelineData):
 
     @typed("x", "y", "z", error=TimelineError)
     def look_at(
-        self,
-        x: float,
-        y: float,
-        z: float,
-        *,
-        over: float,
-        ease: EaseWord = Ease.MINIMUM_JERK,
+        self, x: float, y: float, z: float, *, over: float, ease: EaseWord = Ease.MINIMUM_JERK
     ) -> Self:
         """Turn the trunk (yaw, pitch) so that its axis, and the head, points at a place.
 

@@ -261,11 +261,7 @@ class Steps(TimelineData):
 
     @typed("gait", error=TimelineError)
     def path(
-        self,
-        points: Sequence[Sequence[float]],
-        over: float | None = None,
-        *,
-        gait: str = "walk",
+        self, points: Sequence[Sequence[float]], over: float | None = None, *, gait: str = "walk"
     ) -> Self:
         """Walk along a smooth curve through ``points``; see ``walk``.
 

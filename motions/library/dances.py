@@ -31,8 +31,7 @@ def _lean(line: Timeline, corner: int, *, over: float) -> Timeline:
 
 @motion
 def sway(
-    tempo: Annotated[float, Range(40.0, 90.0, "bpm")] = 60.0,
-    bars: Annotated[int, Range(1, 8)] = 2,
+    tempo: Annotated[float, Range(40.0, 90.0, "bpm")] = 60.0, bars: Annotated[int, Range(1, 8)] = 2
 ) -> Timeline:
     """Sway: from side to side in time, leaning into each step of the song."""
     line = Timeline().bpm(tempo)

@@ -12,10 +12,7 @@ THIGH, CALF = -1.05, -1.15  #: Angles [rad] of the leg that waves
 
 
 @motion
-def wave(
-    side: Side = "right",
-    times: Annotated[int, Range(1, 8)] = 3,
-) -> Timeline:
+def wave(side: Side = "right", times: Annotated[int, Range(1, 8)] = 3) -> Timeline:
     """Wave hello: raise a paw and swing it from side to side."""
     line = (
         Timeline()
@@ -86,10 +83,7 @@ def high_five(
 
 
 @motion
-def shake_paw(
-    side: Side = "right",
-    times: Annotated[int, Range(1, 6)] = 3,
-) -> Timeline:
+def shake_paw(side: Side = "right", times: Annotated[int, Range(1, 6)] = 3) -> Timeline:
     """Shake a paw: offer it, let it be shaken, take it back."""
     line = (
         Timeline()
@@ -106,10 +100,7 @@ def shake_paw(
 
 
 @motion
-def salute(
-    side: Side = "right",
-    hold: Annotated[float, Range(0.3, 5.0, "s")] = 1.0,
-) -> Timeline:
+def salute(side: Side = "right", hold: Annotated[float, Range(0.3, 5.0, "s")] = 1.0) -> Timeline:
     """Salute: a paw to the brow, chest out, hold, and down smartly."""
     line = (
         Timeline()
@@ -127,10 +118,7 @@ def salute(
 
 
 @motion
-def beckon(
-    side: Side = "right",
-    times: Annotated[int, Range(1, 6)] = 3,
-) -> Timeline:
+def beckon(side: Side = "right", times: Annotated[int, Range(1, 6)] = 3) -> Timeline:
     """Beckon: come here! A paw stretched out curls in, again and again."""
     line = Timeline().leg("FR", hip=-0.05, thigh=-0.4, calf=-1.9, over=0.7)
     line = line.also().body(pitch=deg(-6.0), over=0.7)
@@ -142,10 +130,7 @@ def beckon(
 
 
 @motion
-def knock(
-    side: Side = "right",
-    times: Annotated[int, Range(1, 6)] = 3,
-) -> Timeline:
+def knock(side: Side = "right", times: Annotated[int, Range(1, 6)] = 3) -> Timeline:
     """Knock: a raised paw beats three times from the knee, and waits for an answer."""
     line = Timeline().leg("FR", hip=0.0, thigh=-0.5, calf=-1.9, over=0.8)
     for _ in range(times):
@@ -173,10 +158,7 @@ def point(
 
 
 @motion
-def stamp(
-    side: Side = "right",
-    times: Annotated[int, Range(1, 8)] = 3,
-) -> Timeline:
+def stamp(side: Side = "right", times: Annotated[int, Range(1, 8)] = 3) -> Timeline:
     """Stamp: impatient, with a front foot, again and again."""
     line = Timeline().body(pitch=deg(3.0), over=0.4)
     for _ in range(times):

@@ -81,8 +81,7 @@ def content(times: Annotated[int, Range(1, 6)] = 2) -> Timeline:
 
 @motion
 def push_ups(
-    times: Annotated[int, Range(1, 10)] = 4,
-    depth: Annotated[float, Range(0.04, 0.14, "m")] = 0.12,
+    times: Annotated[int, Range(1, 10)] = 4, depth: Annotated[float, Range(0.04, 0.14, "m")] = 0.12
 ) -> Timeline:
     """Push-ups: down and up, as often as you dare."""
     line = Timeline().body(pitch=deg(-4.0), over=0.5)
@@ -162,8 +161,7 @@ def stretch() -> Timeline:
 
 @motion
 def figure_eight(
-    width: Annotated[float, Range(0.02, 0.05, "m")] = 0.04,
-    rounds: Annotated[int, Range(1, 4)] = 2,
+    width: Annotated[float, Range(0.02, 0.05, "m")] = 0.04, rounds: Annotated[int, Range(1, 4)] = 2
 ) -> Timeline:
     """Figure of eight: the trunk draws a lying eight over feet that stay."""
     points = [

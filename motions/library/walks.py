@@ -54,10 +54,7 @@ def patrol(length: Annotated[float, Range(0.3, 2.0, "m")] = 0.8) -> Timeline:
 
 
 @motion
-def pirouette(
-    side: Side = "left",
-    turns: Annotated[int, Range(1, 3)] = 1,
-) -> Timeline:
+def pirouette(side: Side = "left", turns: Annotated[int, Range(1, 3)] = 1) -> Timeline:
     """Pirouette: head up, and once round on the spot."""
     line = Timeline().body(pitch=deg(-7.0), z=0.01, over=0.6)
     for _ in range(2 * turns):
@@ -68,8 +65,7 @@ def pirouette(
 
 @motion
 def side_shuffle(
-    width: Annotated[float, Range(0.08, 0.4, "m")] = 0.2,
-    times: Annotated[int, Range(1, 4)] = 2,
+    width: Annotated[float, Range(0.08, 0.4, "m")] = 0.2, times: Annotated[int, Range(1, 4)] = 2
 ) -> Timeline:
     """Side shuffle: quick steps to the left, quick steps to the right."""
     line = Timeline()
@@ -80,10 +76,7 @@ def side_shuffle(
 
 
 @motion
-def square(
-    edge: Annotated[float, Range(0.2, 1.0, "m")] = 0.4,
-    side: Side = "left",
-) -> Timeline:
+def square(edge: Annotated[float, Range(0.2, 1.0, "m")] = 0.4, side: Side = "left") -> Timeline:
     """Square: four edges, four corners, and back at the start."""
     line = Timeline()
     for _ in range(4):

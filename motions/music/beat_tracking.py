@@ -144,12 +144,7 @@ def _best_beats(onsets: Frames, name: str) -> tuple[float, Int[np.ndarray, " k"]
     best, found = 0.0, None
     for bpm, agreement in _tempi(onsets):
         _, frames = librosa.beat.beat_track(
-            onset_envelope=onsets,
-            sr=RATE,
-            hop_length=HOP,
-            bpm=bpm,
-            tightness=TIGHTNESS,
-            trim=False,
+            onset_envelope=onsets, sr=RATE, hop_length=HOP, bpm=bpm, tightness=TIGHTNESS, trim=False
         )
         likely = np.exp(-0.5 * (np.log2(bpm / USUAL_TEMPO) / TEMPO_SPREAD) ** 2)
         if len(frames) < LEAST_BEATS:

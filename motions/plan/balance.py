@@ -332,9 +332,7 @@ def _gram(
     return band
 
 
-def _edges(
-    stepping: Stepping,
-) -> tuple[Float[np.ndarray, "n 4 2"], Float[np.ndarray, "n 4"]]:
+def _edges(stepping: Stepping) -> tuple[Float[np.ndarray, "n 4 2"], Float[np.ndarray, "n 4"]]:
     """Normals and bounds: n p <= b where p keeps its margin; b is infinite where there is none."""
     count = len(stepping.times)
     normals, bounds = np.zeros((count, 4, 2)), np.full((count, 4), np.inf)

@@ -90,10 +90,7 @@ def followed(
 
 
 def body_path(
-    timeline: Timeline,
-    home: Mapping[Posture, Float[np.ndarray, "6"]],
-    times: Times,
-    ground: Ground,
+    timeline: Timeline, home: Mapping[Posture, Float[np.ndarray, "6"]], times: Times, ground: Ground
 ) -> Poses:
     """Base position [m] and roll, pitch, yaw [rad] at ``times``, without the shift for balance."""
     moves: dict[str, list[Move]] = {channel: [] for channel in BODY_CHANNELS}

@@ -8,15 +8,7 @@ import pytest
 
 from benchmarks import feasibility
 from benchmarks.__main__ import main
-from benchmarks.feasibility import (
-    DYNAMIC,
-    EXAM,
-    OUTCOMES,
-    REFUSED,
-    asked_of,
-    judged,
-    study_of,
-)
+from benchmarks.feasibility import DYNAMIC, EXAM, OUTCOMES, REFUSED, asked_of, judged, study_of
 from benchmarks.study import IDEAL, IMU, TrialResult
 from benchmarks.validation_set import physics
 from benchmarks.validation_set.drawing import TEST, TRAIN

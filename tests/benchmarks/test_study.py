@@ -73,7 +73,7 @@ def test_studies_share_the_processes_seed_by_seed(
     measure_all("any", [fake(), more], 2, jobs=1, resume=False)
     told = re.findall(r"(\d/\d) (\w+), seed (\d): ok", capsys.readouterr().err)
     assert [f"{name} {seed}" for _, name, seed in told] == [
-        *("fake 0", "more 0", "more 1", "fake 1", "more 2", "more 3"),
+        *("fake 0", "more 0", "more 1", "fake 1", "more 2", "more 3")
     ]
     assert told[-1][0] == "6/6"
 

@@ -131,9 +131,7 @@ def _elsewhere(plan: Recording, name: str = "nod") -> Recording:
     )
 
 
-def test_the_page_shows_what_was_written_beside_the_nearest_feasible(
-    checker: Checker,
-) -> None:
+def test_the_page_shows_what_was_written_beside_the_nearest_feasible(checker: Checker) -> None:
     line = Timeline(name="sway", physics="nearest")
     for side in (1.0, -1.0, 1.0):
         line = line.body(y=0.06 * side, over=0.22)
@@ -154,9 +152,7 @@ def test_the_page_shows_what_was_written_beside_the_nearest_feasible(
     np.testing.assert_allclose(run.written.q, content.written.q)
 
 
-def test_the_page_shows_the_beats_and_the_end_of_a_motion_that_moves_on(
-    checker: Checker,
-) -> None:
+def test_the_page_shows_the_beats_and_the_end_of_a_motion_that_moves_on(checker: Checker) -> None:
     line = Timeline(name="on").bpm(120).body(z=-0.01, over=2).home(over=2)
     still = planned(checker.evaluate(line))
     assert still.beats == pytest.approx([0.0, 0.5, 1.0, 1.5, 2.0])

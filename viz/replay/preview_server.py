@@ -129,11 +129,7 @@ class PreviewServer(ThreadingHTTPServer):
             return message({}, self._shown, self._sent.get(str(has)))
 
     def answer(
-        self,
-        told: Mapping[str, object],
-        content: ReplayContent | Prepared,
-        title: str,
-        has: object,
+        self, told: Mapping[str, object], content: ReplayContent | Prepared, title: str, has: object
     ) -> bytes:
         """Something else for the page that asks, with what it is ``told``; see ``changes``."""
         with self._changed:

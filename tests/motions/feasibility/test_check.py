@@ -12,18 +12,8 @@ from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
-from motions import (
-    CheckedMotion,
-    CompiledPlan,
-    Timeline,
-    check,
-    compile_timeline,
-    deg,
-    load_motion,
-)
-from motions import (
-    FeasibilityChecker as Checker,
-)
+from motions import CheckedMotion, CompiledPlan, Timeline, check, compile_timeline, deg, load_motion
+from motions import FeasibilityChecker as Checker
 from motions.feasibility import FeasibilityReport
 from motions.feasibility.forces import CREEP, DRY, VISCOUS, forces_of, resisted, state_at
 from motions.plan.trajectory import trajectory_of

@@ -355,9 +355,7 @@ def to_and_fro(channel: str, size: float, over: float, times: int = 2) -> Timeli
     return line.home(over=over)
 
 
-def test_a_twist_that_slips_and_a_fast_roll_that_creeps_are_refused(
-    checker: Checker,
-) -> None:
+def test_a_twist_that_slips_and_a_fast_roll_that_creeps_are_refused(checker: Checker) -> None:
     # 69 mm on friction 0.5 in MuJoCo; the pyramid's diagonal gave 0.64.
     report = checker.check(to_and_fro("yaw", 0.268, 0.252))
     assert {finding.check for finding in report.failures} >= {"slip"}
@@ -391,9 +389,7 @@ def test_feet_creep_by_what_contacts_leave_out(checker: Checker) -> None:
     assert np.abs(found).max() > 0.01
 
 
-def test_an_unloading_for_a_moment_passes_and_a_flight_does_not(
-    checker: Checker,
-) -> None:
+def test_an_unloading_for_a_moment_passes_and_a_flight_does_not(checker: Checker) -> None:
     def rise(over: float) -> Timeline:
         line = Timeline().body(z=-0.114, over=0.6).body(z=0.02, over=over)
         return line.body(z=-0.114, over=over).home(over=0.6)

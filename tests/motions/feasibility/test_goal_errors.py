@@ -158,9 +158,7 @@ def test_two_feet_at_once_are_raised_where_the_trunk_was_written_not_balanced(
     assert span.trajectory.position_deviation < 0.03
 
 
-def test_what_is_no_motion_to_be_near_to_is_a_failure_in_words(
-    checker: FeasibilityChecker,
-) -> None:
+def test_what_is_no_motion_to_be_near_to_is_a_failure_in_words(checker: FeasibilityChecker) -> None:
     line = Timeline(balance=False, physics="nearest").foot("FL", z=0.04, over=0.2)
     failure = checker.check(line.hold(0.4)).failures[0]
     assert failure.check == "nearest motion"
