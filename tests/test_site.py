@@ -273,9 +273,9 @@ def test_every_key_of_the_configuration_has_a_meaning_and_a_default() -> None:
     from go2_wbc.wbc.config import WbcConfig
 
     rows = {key: (default, meaning) for key, default, meaning in _rows(WbcConfig)}
-    assert rows["friction"] == ("0.6", "mu of the friction pyramid.")
+    assert rows["friction"] == ("0.6", "Mu of the friction pyramid.")
     assert rows["swing_foot"][0] == "{ kp = [500, 500, 500], kd = [40, 40, 40] }"
-    assert rows["posture_weight"][1].startswith("task weights, 1e-3 to 1e3; ")
+    assert rows["posture_weight"][1].startswith("Task weights, 1e-3 to 1e3; ")
 
 
 def test_every_gait_that_has_a_name_is_in_the_table_of_envelopes() -> None:

@@ -25,6 +25,7 @@ from docutils import nodes
 from docutils.statemachine import StringList
 from plain_docstrings import as_markup
 from sphinx.application import Sphinx
+from sphinx.pycode import ModuleAnalyzer
 from sphinx.util.docutils import SphinxDirective
 
 from controller.cli.main import COMMANDS, PROGRAM
@@ -157,18 +158,21 @@ def help_of(name: str) -> str:
 
 
 def config_rows(kind: type) -> Iterator[tuple[str, str, str]]:
-    """Name, default and meaning of every field, from the class and its docstring."""
+    """Name, default and meaning of every field, from the class's docstring or beside the field."""
     described = inspect.getdoc(kind) or ""
     meanings = {
-        name: " ".join(match[2].split())
+        name: match[2]
         for match in _FIELD.finditer(described.partition("Attributes:")[2])
         for name in match[1].split(", ")
     }
+    beside = ModuleAnalyzer.for_module(kind.__module__).find_attr_docs()
+    meanings |= {name: " ".join(told) for (of, name), told in beside.items() if of == kind.__name__}
     example = kind()
     for item in dataclasses.fields(kind):
         value = getattr(example, item.name)
         is_table = dataclasses.is_dataclass(value) and not isinstance(value, Gains)
-        yield item.name, "" if is_table else _shown(value), meanings[item.name]
+        meaning = " ".join(meanings[item.name].split()).rstrip(".")
+        yield item.name, "" if is_table else _shown(value), f"{meaning[0].upper()}{meaning[1:]}."
 
 
 def _shown(value: object) -> str:

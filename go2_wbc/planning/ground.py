@@ -107,22 +107,15 @@ _TINY = 1e-9  #: Speed [m/s] that stands in for none where one divides by it
 )
 @ranged(NOT_NEGATIVE, speed=POSITIVE)
 class RoughConfig:
-    """How the robot walks where its feet have found the ground rough.
+    """How the robot walks where its feet have found the ground rough."""
 
-    Attributes:
-        speed: greatest speed [m/s].
-        high_speed: greatest speed [m/s] among high steps; the first step, of which that is not
-            known yet, is taken for one.
-        raised: least height [m] by which a swing is higher on a slope.
-        swing: time [s] by which it is longer.
-        stance: longest time [s] that a foot stands, if that is not shorter already.
-    """
-
-    speed: float = 0.5
+    speed: float = 0.5  #: greatest speed [m/s]
     high_speed: float = 0.43
-    raised: float = 0.02
-    swing: float = 0.04
-    stance: float = 0.16
+    """Greatest speed [m/s] among high steps; the first step, of which that is not known yet, is
+    taken for one."""
+    raised: float = 0.02  #: least height [m] by which a swing is higher on a slope
+    swing: float = 0.04  #: time [s] by which it is longer
+    stance: float = 0.16  #: longest time [s] that a foot stands, if that is not shorter already
 
 
 class Ground(Record):

@@ -130,17 +130,11 @@ class PoseEnvelope:
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE)
 class PoseConfig:
-    """How a new pose is approached (own choice: about a second for any allowed pose).
+    """How a new pose is approached (own choice: about a second for any allowed pose)."""
 
-    Attributes:
-        height_rate: greatest rate of the height [m/s].
-        turning_rate: greatest rate of roll, pitch and yaw [rad/s].
-        sharpness: rate [1/s] at which the remaining error decays near the end.
-    """
-
-    height_rate: float = 0.10
-    turning_rate: float = 0.35
-    sharpness: float = 5.0
+    height_rate: float = 0.10  #: greatest rate of the height [m/s]
+    turning_rate: float = 0.35  #: greatest rate of roll, pitch and yaw [rad/s]
+    sharpness: float = 5.0  #: rate [1/s] at which the remaining error decays near the end
 
 
 @subroutine

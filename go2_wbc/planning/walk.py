@@ -63,57 +63,42 @@ LEAST_HEIGHT, GREATEST_HEIGHT = 0.18, 0.34  #: CoM heights [m] between which the
     normal_force_min=NOT_NEGATIVE,
 )
 class LocomotionConfig:
-    """Numbers of the locomotion planner, from a search on this robot in simulation.
+    """Numbers of the locomotion planner, from a search on this robot in simulation."""
 
-    Attributes:
-        height: CoM height [m] above the ground.
-        compression: by which feet are compressed, or sink into the ground, under the trunk's weight
-            [m]: in MuJoCo 1 to 6 mm, by the friction of the joints.
-        linear_acceleration: greatest change of the commanded velocity [m/s^2], where the ground
-            bears it and commands act at once; else reduced by ``ground.haste``.
-        angular_acceleration: greatest change of the commanded turning rate [rad/s^2].
-        velocity_feedback: foothold offset [s] per velocity error.
-        stride_margin: speed [m/s] beyond the commanded one from which on the stride follows the
-            measured speed. A push of 50 N s makes the robot 3.4 m/s fast: with the stance time of
-            0.5 m/s the trunk then travels half a metre, and falls.
-        position_leash: distance [m] that the reference may run ahead of the robot.
-        yaw_leash: angle [rad] that the heading reference may run ahead.
-        foothold_reach: greatest horizontal distance [m] of a foothold from below its hip.
-        normal_force_min: least normal force [N] required of a stance foot.
-        normal_force_max: greatest normal force [N] allowed on a stance foot.
-        settle_speed: speed [m/s] below which a robot without command may stop stepping.
-        capture_margin: distance [m] of the capture point from the middle of the feet beyond which a
-            standing robot starts to step.
-        square_tolerance: distance [m] of a foot from below its hip at which the robot stands
-            squarely enough to stop stepping.
-        ground_friction: assumed coefficient of the ground until the robot has walked on it.
-            Walking, with and without slip, updates the estimate, and the next walk begins with
-            that.
-        swing: shape of the swing.
-        mpc: the MPC of the contact forces.
-        pose: how a new pose of the trunk is approached.
-        rough: how it walks on rough ground.
-    """
-
-    height: float = 0.29
+    height: float = 0.29  #: CoM height [m] above the ground
     compression: float = 0.004
+    """By which feet are compressed, or sink into the ground, under the trunk's weight [m]: in
+    MuJoCo 1 to 6 mm, by the friction of the joints."""
     linear_acceleration: float = 6.0
-    angular_acceleration: float = 4.0
-    velocity_feedback: float = 0.12
+    """Greatest change of the commanded velocity [m/s^2], where the ground bears it and commands act
+    at once; else reduced by ``ground.haste``."""
+    angular_acceleration: float = 4.0  #: greatest change of the commanded turning rate [rad/s^2]
+    velocity_feedback: float = 0.12  #: foothold offset [s] per velocity error
     stride_margin: float = 0.4
-    position_leash: float = 0.08
-    yaw_leash: float = 0.3
+    """Speed [m/s] beyond the commanded one from which on the stride follows the measured speed. A
+    push of 50 N s makes the robot 3.4 m/s fast: with the stance time of 0.5 m/s the trunk then
+    travels half a metre, and falls."""
+    position_leash: float = 0.08  #: distance [m] that the reference may run ahead of the robot
+    yaw_leash: float = 0.3  #: angle [rad] that the heading reference may run ahead
     foothold_reach: float = 0.22
-    normal_force_min: float = 0.0
-    normal_force_max: float = 400.0
-    settle_speed: float = 0.05
+    """Greatest horizontal distance [m] of a foothold from below its hip."""
+    normal_force_min: float = 0.0  #: least normal force [N] required of a stance foot
+    normal_force_max: float = 400.0  #: greatest normal force [N] allowed on a stance foot
+    settle_speed: float = 0.05  #: speed [m/s] below which a robot without command may stop stepping
     capture_margin: float = 0.09
+    """Distance [m] of the capture point from the middle of the feet beyond which a standing robot
+    starts to step."""
     square_tolerance: float = 0.02
+    """Distance [m] of a foot from below its hip at which the robot stands squarely enough to stop
+    stepping."""
     ground_friction: float = 0.2
-    swing: SwingConfig = field(default_factory=SwingConfig)
-    mpc: MpcConfig = field(default_factory=MpcConfig)
+    """Assumed coefficient of the ground until the robot has walked on it. Walking, with and without
+    slip, updates the estimate, and the next walk begins with that."""
+    swing: SwingConfig = field(default_factory=SwingConfig)  #: shape of the swing
+    mpc: MpcConfig = field(default_factory=MpcConfig)  #: the MPC of the contact forces
     pose: PoseConfig = field(default_factory=PoseConfig)
-    rough: RoughConfig = field(default_factory=RoughConfig)
+    """How a new pose of the trunk is approached."""
+    rough: RoughConfig = field(default_factory=RoughConfig)  #: how it walks on rough ground
 
     __repr__ = brief
 

@@ -34,50 +34,35 @@ SPLAY = 0.3
 
 @dataclass(frozen=True, slots=True)
 class RobotProfile:
-    """A robot, beside its URDF. Triples of joints are hip, thigh, calf.
+    """A robot, beside its URDF. Triples of joints are hip, thigh, calf."""
 
-    Attributes:
-        name: what ``robot=`` takes.
-        title: what people call it.
-        description: its folder in the ``example-robot-data`` package.
-        foot_radius: radius [m] of the spherical feet.
-        hip_limit: angle [rad] beyond which no hip is turned, if the URDF's range is wider.
-        imu_place: place [m] of the IMU in the base frame.
-        armature: rotor inertia seen at the joints [kg m^2].
-        damping: viscous friction of simulated joints [N m s/rad].
-        friction_loss: their dry friction [N m].
-        knee_share: speed from which a driving motor's torque falls, as a share of the speed
-            without load (``robot.motor``).
-        envelope: speeds ahead, back, aside [m/s] and turning rate [rad/s] within which it trots
-            in simulation where nothing is configured.
-        stand_height: height [m] of the CoM above the ground when standing.
-        sit: height [m] of the base and pitch [rad] of the dog-like sit: rump down, front legs up.
-        lie_height: height [m] of the base just above the ground, from which it goes limp.
-        tucked: joint angles [rad] with the feet under the hips and the belly on the ground.
-        underside: points [m] of the trunk in the base frame that touch flat ground first, within
-            1 cm, at tilts up to 60 deg.
-        motions: arguments that motions of the library are given unless told otherwise, by motion.
-        config: tables of the configuration (``go2_wbc.config``) that are other than the usual.
-    """
-
-    name: str
-    title: str
-    description: str
-    foot_radius: float
-    hip_limit: float
-    imu_place: V3
-    armature: V3
-    damping: V3
-    friction_loss: V3
+    name: str  #: what ``robot=`` takes
+    title: str  #: what people call it
+    description: str  #: its folder in the ``example-robot-data`` package
+    foot_radius: float  #: radius [m] of the spherical feet
+    hip_limit: float  #: angle [rad] beyond which no hip is turned, if the URDF's range is wider
+    imu_place: V3  #: place [m] of the IMU in the base frame
+    armature: V3  #: rotor inertia seen at the joints [kg m^2]
+    damping: V3  #: viscous friction of simulated joints [N m s/rad]
+    friction_loss: V3  #: their dry friction [N m]
     knee_share: float
+    """Speed from which a driving motor's torque falls, as a share of the speed without load
+    (``robot.motor``)."""
     envelope: tuple[float, float, float, float]
-    stand_height: float
+    """Speeds ahead, back, aside [m/s] and turning rate [rad/s] within which it trots in simulation
+    where nothing is configured."""
+    stand_height: float  #: height [m] of the CoM above the ground when standing
     sit: tuple[float, float]
-    lie_height: float
-    tucked: V3
+    """Height [m] of the base and pitch [rad] of the dog-like sit: rump down, front legs up."""
+    lie_height: float  #: height [m] of the base just above the ground, from which it goes limp
+    tucked: V3  #: joint angles [rad] with the feet under the hips and the belly on the ground
     underside: tuple[V3, ...]
+    """Points [m] of the trunk in the base frame that touch flat ground first, within 1 cm, at tilts
+    up to 60 deg."""
     motions: Mapping[str, Mapping[str, float]] = field(default_factory=dict, hash=False)
+    """Arguments that motions of the library are given unless told otherwise, by motion."""
     config: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    """Tables of the configuration (``go2_wbc.config``) that are other than the usual."""
 
     __repr__ = brief
 

@@ -68,17 +68,11 @@ near the speed without load; own choice."""
 
 @dataclass(frozen=True, slots=True)
 class MotorModel:
-    """Torques that the twelve motors can give, in the order of ``JOINT_NAMES``.
+    """Torques that the twelve motors can give, in the order of ``JOINT_NAMES``."""
 
-    Attributes:
-        peak: torque limits [N m] up to the knee, and of a braking motor.
-        knee_speed: speeds [rad/s] from which the torque of a driving motor falls.
-        no_load_speed: speeds [rad/s] at which it is gone; infinite for an ideal motor.
-    """
-
-    peak: Array12
-    knee_speed: Array12
-    no_load_speed: Array12
+    peak: Array12  #: torque limits [N m] up to the knee, and of a braking motor
+    knee_speed: Array12  #: speeds [rad/s] from which the torque of a driving motor falls
+    no_load_speed: Array12  #: speeds [rad/s] at which it is gone; infinite for an ideal motor
 
     @staticmethod
     def named(name: str, description: RobotDescription) -> MotorModel:
@@ -219,18 +213,13 @@ class JointFriction:
     Viscous friction is not fed forward by default. An excess puts power into the joint: a robot
     with 2 N m s/rad falls with a feed-forward of 3. Use at most three quarters of the measured
     value.
-
-    Attributes:
-        dry: friction [N m] that does not depend on the speed: FL hip, thigh, calf, then FR, RL, RR.
-        viscous: friction [N m s/rad] that grows with the speed.
-        transition: speed [rad/s] over which the dry friction changes its sign.
-        lookahead: time [s] by which a joint's speed is predicted.
     """
 
     dry: PerJoint = (0.1,) * 12
-    viscous: PerJoint = (0.0,) * 12
-    transition: float = 0.1
-    lookahead: float = 0.01
+    """Friction [N m] that does not depend on the speed: FL hip, thigh, calf, then FR, RL, RR."""
+    viscous: PerJoint = (0.0,) * 12  #: friction [N m s/rad] that grows with the speed
+    transition: float = 0.1  #: speed [rad/s] over which the dry friction changes its sign
+    lookahead: float = 0.01  #: time [s] by which a joint's speed is predicted
 
     def __post_init__(self) -> None:
         """Raise ConfigError for another count of numbers than twelve."""

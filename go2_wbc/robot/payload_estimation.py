@@ -54,44 +54,36 @@ class PayloadConfig:
     masses 10 % wrong, in every gait, also on its sensors: 1.9 kg, 0.06 kg m ahead and 0.04 aside.
     On joints with twice the friction, or that of other models of a Go2, it was 3.8 kg, 0.18 and
     0.04 kg m; on slopes of 15 deg 0.18 and 0.14 kg m.
-
-    Attributes:
-        enabled: whether a payload is estimated. The back end "placo", which has a robot of its own,
-            does not use the estimate.
-        memory: time constant [s] of the means.
-        response: time constant [s] with which the estimate in use follows the measured one.
-        centred_mass: mass [kg] from which on a payload counts wherever it lies.
-        least_mass: mass [kg] from which on one that lies beside the middle counts.
-        least_moment: first moment [kg m] about the middle, ahead and aside, from which on it does.
-        patience: time [s] for which it must be measured before it counts: impacts on the trunk or a
-            leg are shorter.
-        release: share of the thresholds below which it no longer counts.
-        most_mass: greatest mass [kg] of the estimate.
-        reach: greatest distance [m] of the estimate from the middle, ahead and aside.
-        middle: own CoM of the standing robot in the base frame [m].
-        base_height: of the base's origin over the ground, standing [m].
-        least_height: of the base over the lowest foot, below which the belly may carry [m].
-        most_rise: vertical speed [m/s] of the CoM beyond which nothing is estimated: friction in
-            the joints of a rising robot looks like a load.
-        most_speed: of the base, ahead and aside [m/s]: beyond it friction looks like a load that
-            lies ahead, or aside.
     """
 
     enabled: bool = True
-    memory: float = 0.5
+    """Whether a payload is estimated. The back end "placo", which has a robot of its own, does not
+    use the estimate."""
+    memory: float = 0.5  #: time constant [s] of the means
     response: float = 0.5
-    centred_mass: float = 4.0
-    least_mass: float = 1.0
+    """Time constant [s] with which the estimate in use follows the measured one."""
+    centred_mass: float = 4.0  #: mass [kg] from which on a payload counts wherever it lies
+    least_mass: float = 1.0  #: mass [kg] from which on one that lies beside the middle counts
     least_moment: tuple[float, float] = (0.25, 0.15)
+    """First moment [kg m] about the middle, ahead and aside, from which on it does."""
     patience: float = 0.5
-    release: float = 0.7
-    most_mass: float = 10.0
+    """Time [s] for which it must be measured before it counts: impacts on the trunk or a leg are
+    shorter."""
+    release: float = 0.7  #: share of the thresholds below which it no longer counts
+    most_mass: float = 10.0  #: greatest mass [kg] of the estimate
     reach: tuple[float, float] = (0.2, 0.1)
+    """Greatest distance [m] of the estimate from the middle, ahead and aside."""
     middle: tuple[float, float, float] = (0.0, 0.0, -0.019)
-    base_height: float = 0.31
+    """Own CoM of the standing robot in the base frame [m]."""
+    base_height: float = 0.31  #: of the base's origin over the ground, standing [m]
     least_height: float = 0.15
+    """Of the base over the lowest foot, below which the belly may carry [m]."""
     most_rise: float = 0.1
+    """Vertical speed [m/s] of the CoM beyond which nothing is estimated: friction in the joints of
+    a rising robot looks like a load."""
     most_speed: tuple[float, float] = (1.5, 0.4)
+    """Of the base, ahead and aside [m/s]: beyond it friction looks like a load that lies ahead, or
+    aside."""
 
     __repr__ = brief
 

@@ -65,45 +65,39 @@ def heights(now: Snapshot, underside: ArrayNx3) -> tuple[float, float]:
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE)
 class SafetyConfig:
-    """When to give up and go limp.
-
-    Attributes:
-        tilt_limit: tilt [rad] of the trunk beyond which a balancing robot counts as fallen, also
-            where a motion wants it; rearing by 59 deg is done.
-        astray_tilt_limit: the same for a robot that leans by half of ``lean_limit`` or more from
-            its reference, or that may lie. After a push a robot may be at 60 deg for a moment only,
-            and its sensors off by a degree.
-        height_limit: height [m] of the base over the centre of the lowest foot below which a
-            balancing robot counts as collapsed; on its belly it is 0.063.
-        touch_limit: time [s] for which the trunk of a balancing robot may touch the ground, or
-            bounce off it, while it has sunk by more than half of ``sink_limit`` or leans by more
-            than half of ``lean_limit``, except for a graze; hardly any robot that withstood a push
-            in simulation did.
-        sink_limit: depth [m] of the trunk below its reference beyond which it has sunk; in
-            simulation 0.01 at most in every motion, 0.07 with a payload of 8 kg.
-        sink_limit_time: time [s] for which it may; after pushes that a trot withstood 0.16 at most.
-        lean_limit: angle [rad] between the trunk's attitude and its reference, without heading,
-            beyond which it leans; in simulation 0.10 at most in every motion, 0.16 after pushes
-            that the robot withstood, 1.0 at rest on a limb.
-        lean_limit_time: time [s] for which it may.
-        stale_limit: time [s] without news from the plant after which it counts as silent.
-        qp_patience: QP failures in a row after which the robot is damped for good.
-        grave_limit_time: time [s] for which constraints may be violated by more than
-            ``wbc.solvers.LIMITS`` before the robot is damped for good; after pushes that a trot
-            withstood 0.036 at most (a hip at its stop).
-    """
+    """When to give up and go limp."""
 
     tilt_limit: float = 1.05
+    """Tilt [rad] of the trunk beyond which a balancing robot counts as fallen, also where a motion
+    wants it; rearing by 59 deg is done."""
     astray_tilt_limit: float = 1.0
+    """The same for a robot that leans by half of ``lean_limit`` or more from its reference, or that
+    may lie. After a push a robot may be at 60 deg for a moment only, and its sensors off by a
+    degree."""
     height_limit: float = 0.075
+    """Height [m] of the base over the centre of the lowest foot below which a balancing robot
+    counts as collapsed; on its belly it is 0.063."""
     touch_limit: float = 0.1
+    """Time [s] for which the trunk of a balancing robot may touch the ground, or bounce off it,
+    while it has sunk by more than half of ``sink_limit`` or leans by more than half of
+    ``lean_limit``, except for a graze; hardly any robot that withstood a push in simulation did."""
     sink_limit: float = 0.12
+    """Depth [m] of the trunk below its reference beyond which it has sunk; in simulation 0.01 at
+    most in every motion, 0.07 with a payload of 8 kg."""
     sink_limit_time: float = 0.3
+    """Time [s] for which it may; after pushes that a trot withstood 0.16 at most."""
     lean_limit: float = 0.52
-    lean_limit_time: float = 0.3
+    """Angle [rad] between the trunk's attitude and its reference, without heading, beyond which it
+    leans; in simulation 0.10 at most in every motion, 0.16 after pushes that the robot withstood,
+    1.0 at rest on a limb."""
+    lean_limit_time: float = 0.3  #: time [s] for which it may
     stale_limit: float = 0.03
-    qp_patience: int = 10
+    """Time [s] without news from the plant after which it counts as silent."""
+    qp_patience: int = 10  #: QP failures in a row after which the robot is damped for good
     grave_limit_time: float = 0.1
+    """Time [s] for which constraints may be violated by more than ``wbc.solvers.LIMITS`` before the
+    robot is damped for good; after pushes that a trot withstood 0.036 at most (a hip at its
+    stop)."""
 
     __repr__ = brief
 

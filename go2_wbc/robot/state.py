@@ -140,13 +140,10 @@ class PartFault:
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """What of a robot is broken.
-
-    Attributes:
-        faults: in the order in which they were noticed; empty if it seems sound.
-    """
+    """What of a robot is broken."""
 
     faults: tuple[PartFault, ...] = ()
+    """In the order in which they were noticed; empty if it seems sound."""
 
     @property
     def is_sound(self) -> bool:

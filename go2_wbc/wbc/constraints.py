@@ -142,18 +142,15 @@ def left_over(now: Snapshot, task: StanceFeetStill, leg: int) -> V3:
 
 @dataclass(frozen=True, slots=True)
 class FrictionPyramid(Inequality):
-    """|f_x| <= mu f_z and |f_y| <= mu f_z for every stance foot, and bounds on f_z.
-
-    Attributes:
-        friction: mu of the square pyramid, per axis; on the diagonal it allows 1.4 times as much.
-            A reference may ask for less.
-        keeps_cone: whether the pyramid of a foot with a planned force lies inside of the cone of
-            ``friction`` instead, an edge of it along that force on the ground: of all inscribed
-            ones this allows most in its direction.
-    """
+    """|f_x| <= mu f_z and |f_y| <= mu f_z for every stance foot, and bounds on f_z."""
 
     friction: float
+    """Mu of the square pyramid, per axis; on the diagonal it allows 1.4 times as much. A reference
+    may ask for less."""
     keeps_cone: bool = False
+    """Whether the pyramid of a foot with a planned force lies inside of the cone of ``friction``
+    instead, an edge of it along that force on the ground: of all inscribed ones this allows most in
+    its direction."""
     name = "contact forces"
     unit = "N"
 

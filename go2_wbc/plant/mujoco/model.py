@@ -58,18 +58,15 @@ class JointDynamics:
     """What the URDF does not say about the joints; each triple is hip, thigh, calf.
 
     By default that of a Go2's profile, which says where it comes from.
-
-    Attributes:
-        armature: rotor inertia seen at the joint [kg m^2].
-        damping: viscous friction [N m s/rad].
-        friction_loss: dry friction [N m].
     """
 
     armature: tuple[float, float, float] = field(default_factory=lambda: find_profile().armature)
+    """Rotor inertia seen at the joint [kg m^2]."""
     damping: tuple[float, float, float] = field(default_factory=lambda: find_profile().damping)
+    """Viscous friction [N m s/rad]."""
     friction_loss: tuple[float, float, float] = field(
         default_factory=lambda: find_profile().friction_loss
-    )
+    )  #: dry friction [N m]
 
     @staticmethod
     def of(profile: RobotProfile) -> JointDynamics:
