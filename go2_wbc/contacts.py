@@ -131,19 +131,14 @@ class Stride:
     Those of a slow trot are as long as they can be: the way of the feet up and down costs the same
     energy each time. At 0.5 m/s a trot of 0.33 s took 1.07 of its weight times its way, this one of
     0.40 s 0.74 (on sensors, in the mean of three seeds).
-
-    Attributes:
-        reach: way [m] of the trunk over a standing foot.
-        stance_min, stance_max: bounds [s] of the time that a foot stands.
-        swing: time [s] of the swing at 1 m/s.
-        swing_slope: what each m/s more adds to it [s^2/m].
     """
 
-    reach: float = 0.20
+    reach: float = 0.20  #: way [m] of the trunk over a standing foot
     stance_min: float = 0.08
     stance_max: float = 0.20
-    swing: float = 0.20
-    swing_slope: float = 0.01
+    """Bounds [s] of the time that a foot stands."""
+    swing: float = 0.20  #: time [s] of the swing at 1 m/s
+    swing_slope: float = 0.01  #: what each m/s more adds to it [s^2/m]
 
     def __post_init__(self) -> None:
         """Raise ConfigError for bounds or a swing that leave no stride."""

@@ -23,25 +23,16 @@ _LEAST_SAMPLES = 2
 @typed()
 @dataclass(frozen=True, slots=True)
 class MarginCurve:
-    """What is left to one limit over time: the least of all its subjects.
+    """What is left to one limit over time: the least of all its subjects."""
 
-    Attributes:
-        name: of the limit.
-        unit: of the margin.
-        time: (n,) seconds after the start.
-        margin: (n,) negative where the limit is broken, nan where there is nothing to judge.
-        subjects: what is judged.
-        worst: (n,) which subject has the least margin, a row of ``subjects``.
-        tight: a margin below it deserves a warning.
-    """
-
-    name: str
-    unit: str
-    time: Float[np.ndarray, " n"]
+    name: str  #: of the limit
+    unit: str  #: of the margin
+    time: Float[np.ndarray, " n"]  #: (n,) seconds after the start
     margin: Float[np.ndarray, " n"]
-    subjects: tuple[str, ...]
-    worst: Int[np.ndarray, " n"]
-    tight: float | int = 0.0
+    """(n,) negative where the limit is broken, nan where there is nothing to judge."""
+    subjects: tuple[str, ...]  #: what is judged
+    worst: Int[np.ndarray, " n"]  #: (n,) which subject has the least margin, a row of ``subjects``
+    tight: float | int = 0.0  #: a margin below it deserves a warning
 
     __repr__ = brief
 
@@ -60,23 +51,16 @@ class MarginCurve:
 @typed()
 @dataclass(frozen=True, slots=True)
 class Annotation:
-    """A limit that one subject breaks, or nearly does.
-
-    Attributes:
-        limit, subject, time: its name; joint, foot or part of the body; when [s] it is worst.
-        text: value and limit in words.
-        is_broken: otherwise the margin is only tight.
-        spans: start and end [s] of each stretch in which it is so.
-        parts: links that are concerned, such as ``FL_calf``, or ``CENTRE_OF_MASS``.
-    """
+    """A limit that one subject breaks, or nearly does."""
 
     limit: str
     subject: str
     time: float
-    text: str
-    is_broken: bool
-    spans: tuple[tuple[float, float], ...]
-    parts: tuple[str, ...]
+    """Its name; joint, foot or part of the body; when [s] it is worst."""
+    text: str  #: value and limit in words
+    is_broken: bool  #: otherwise the margin is only tight
+    spans: tuple[tuple[float, float], ...]  #: start and end [s] of each stretch in which it is so
+    parts: tuple[str, ...]  #: links that are concerned, such as ``FL_calf``, or ``CENTRE_OF_MASS``
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,27 +91,16 @@ class CertifiedRate:
 @typed()
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What a check says of a movement.
+    """What a check says of a movement."""
 
-    Attributes:
-        ok: no limit is broken.
-        text: the verdict in a few words.
-        annotations: the broken limits, then the tight ones.
-        curves: the margin of every limit.
-        chance: that the movement is done, 0 to 1; None if nothing is said of it.
-        world: in which all this holds, in words.
-        coarse: why it is only a first answer, in words; empty if it is exact.
-        certified: how often it was done in randomised runs.
-    """
-
-    ok: bool
-    text: str
-    annotations: tuple[Annotation, ...]
-    curves: tuple[MarginCurve, ...]
-    chance: float | None = None
-    world: str = ""
-    coarse: str = ""
-    certified: CertifiedRate | None = None
+    ok: bool  #: no limit is broken
+    text: str  #: the verdict in a few words
+    annotations: tuple[Annotation, ...]  #: the broken limits, then the tight ones
+    curves: tuple[MarginCurve, ...]  #: the margin of every limit
+    chance: float | None = None  #: that the movement is done, 0 to 1; None if nothing is said of it
+    world: str = ""  #: in which all this holds, in words
+    coarse: str = ""  #: why it is only a first answer, in words; empty if it is exact
+    certified: CertifiedRate | None = None  #: how often it was done in randomised runs
 
     __repr__ = brief
 
@@ -153,38 +126,30 @@ class Slider:
 @typed()
 @dataclass(frozen=True, slots=True)
 class ReplayContent:
-    """What to show.
+    """What to show."""
 
-    Attributes:
-        recording: the movement of the solid robot.
-        is_plan: it is a plan; otherwise it was measured.
-        verdict: what to say about the motion.
-        ghost: the plan of what was measured, shown translucent; its clock starts with the
-            recording's, and the verdict is on it.
-        proposal: the verdict on the ghost, where that is another motion, proposed in its place.
-        written: what was written, where the plan is only the nearest to it; shown translucent in
-            another colour. Of its forces, torques and margins nothing is shown.
-        beats: instants [s] that the motion counts in, drawn as a ruler.
-        sliders: parameters that a live page lets one choose.
-        sound: an MP3 file that starts with the recording, played in step with it; empty for none.
-        end_pose: where the movement shall end: x, y [m] and yaw [rad] of the frame of the feet.
-        bar: beats of a bar, and the number of the beat on which the first begins.
-        editor: what a page that edits the motion's file shows of it, as for JSON; see
-            ``controller.studio``.
-    """
-
-    recording: Recording
-    is_plan: bool = False
-    verdict: Verdict | None = None
+    recording: Recording  #: the movement of the solid robot
+    is_plan: bool = False  #: it is a plan; otherwise it was measured
+    verdict: Verdict | None = None  #: what to say about the motion
     ghost: Recording | None = None
+    """The plan of what was measured, shown translucent; its clock starts with the recording's, and
+    the verdict is on it."""
     proposal: Verdict | None = None
+    """The verdict on the ghost, where that is another motion, proposed in its place."""
     written: Recording | None = None
-    beats: tuple[float, ...] = ()
-    sliders: tuple[Slider, ...] = ()
+    """What was written, where the plan is only the nearest to it; shown translucent in another
+    colour. Of its forces, torques and margins nothing is shown."""
+    beats: tuple[float, ...] = ()  #: instants [s] that the motion counts in, drawn as a ruler
+    sliders: tuple[Slider, ...] = ()  #: parameters that a live page lets one choose
     sound: bytes = b""
+    """An MP3 file that starts with the recording, played in step with it; empty for none."""
     end_pose: tuple[float, float, float] | None = None
+    """Where the movement shall end: x, y [m] and yaw [rad] of the frame of the feet."""
     bar: tuple[int, int] = (4, 0)
+    """Beats of a bar, and the number of the beat on which the first begins."""
     editor: Mapping[str, object] | None = None
+    """What a page that edits the motion's file shows of it, as for JSON; see
+    ``controller.studio``."""
 
     __repr__ = brief
 

@@ -98,40 +98,24 @@ class CommandRanges:
 
 @dataclass(frozen=True, slots=True)
 class Sidecar:
-    """What the numbers of a policy mean; see the module.
+    """What the numbers of a policy mean; see the module."""
 
-    Attributes:
-        robot: name of the profile of the robot that it drives.
-        rate: of the policy [Hz].
-        order: for each of its joints the number of ours, FL hip to RR calf.
-        signs: 1, or -1 where its joint turns the other way.
-        default: joint angles [rad] where its actions are 0, and its joint positions.
-        action_scale: [rad] per action.
-        action_clip: actions are clipped to plus or minus this.
-        kp, kd: stiffness [N m/rad] and damping [N m s/rad] of the joints.
-        commands: on which it was trained.
-        terms: of the observation.
-        history: how many rows an observation holds, this one included.
-        by_terms: whether of each term all rows stand together.
-        oldest_first: whether the oldest row, or value, comes first.
-        observation_clip: terms are clipped to plus or minus this.
-    """
-
-    robot: str
-    rate: float
-    order: Int[np.ndarray, "12"]
-    signs: Array12
-    default: Array12
-    action_scale: Array12
-    action_clip: float
+    robot: str  #: name of the profile of the robot that it drives
+    rate: float  #: of the policy [Hz]
+    order: Int[np.ndarray, "12"]  #: for each of its joints the number of ours, FL hip to RR calf
+    signs: Array12  #: 1, or -1 where its joint turns the other way
+    default: Array12  #: joint angles [rad] where its actions are 0, and its joint positions
+    action_scale: Array12  #: [rad] per action
+    action_clip: float  #: actions are clipped to plus or minus this
     kp: Array12
     kd: Array12
-    commands: CommandRanges
-    terms: tuple[Term, ...]
-    history: int
-    by_terms: bool
-    oldest_first: bool
-    observation_clip: float
+    """Stiffness [N m/rad] and damping [N m s/rad] of the joints."""
+    commands: CommandRanges  #: on which it was trained
+    terms: tuple[Term, ...]  #: of the observation
+    history: int  #: how many rows an observation holds, this one included
+    by_terms: bool  #: whether of each term all rows stand together
+    oldest_first: bool  #: whether the oldest row, or value, comes first
+    observation_clip: float  #: terms are clipped to plus or minus this
 
     __repr__ = brief
 

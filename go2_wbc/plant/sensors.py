@@ -43,23 +43,19 @@ class SensorNoise:
     The Go2 publishes no sensor data sheet. The values are the order of what published Go1/Go2
     learning code randomises over (encoder 0.01 rad, gyro 0.2 rad/s are its wide ends; here a
     fifth), and of a consumer MEMS unit sampled at 500 Hz.
-
-    Attributes:
-        position, linear_velocity: of the base [m], [m/s], as from an estimator or motion capture.
-        orientation: base orientation, rotation vector [rad].
-        gyro, accelerometer: angular velocity [rad/s] and specific force [m/s^2].
-        joint_position, joint_velocity: encoder [rad], and differentiated [rad/s].
-        foot_force: foot sensor [N].
     """
 
     position: float = 0.002
     linear_velocity: float = 0.02
-    orientation: float = 0.005
+    """Of the base [m], [m/s], as from an estimator or motion capture."""
+    orientation: float = 0.005  #: base orientation, rotation vector [rad]
     gyro: float = 0.02
     accelerometer: float = 0.1
+    """Angular velocity [rad/s] and specific force [m/s^2]."""
     joint_position: float = 0.002
     joint_velocity: float = 0.05
-    foot_force: float = 2.0
+    """Encoder [rad], and differentiated [rad/s]."""
+    foot_force: float = 2.0  #: foot sensor [N]
 
     def corrupt_state(self, state: RobotState, rng: np.random.Generator) -> RobotState:
         """``state`` with noise added; time and torque are known exactly."""
@@ -113,28 +109,23 @@ class SensorErrors:
     noise three times that for the vibration of the legs, the accelerometer's offset a quarter after
     calibration. The encoders' resolution is that of the protocol of Unitree's GO-M8010-6 motor
     (angle 2 pi / 32768, speed 2 pi / 256 rad/s of the rotor, gear 6.33).
-
-    Attributes:
-        gyro, gyro_bias: white noise per sample, and deviation of its bias [rad/s].
-        accelerometer, accelerometer_bias: the same [m/s^2].
-        angle_step, speed_step: resolution of a joint's angle [rad] and velocity [rad/s].
-        speed: white noise on it [rad/s], own choice: five steps.
-        force: white noise on a foot's force [N].
-        force_step: resolution of a foot's force [N]; the robot sends whole numbers.
-        latency: age of what the controller is given [s], rounded to whole control periods; half
-            of a round trip of the robot's bus would be 0.001.
     """
 
     gyro: float = 0.012
     gyro_bias: float = 0.0175
+    """White noise per sample, and deviation of its bias [rad/s]."""
     accelerometer: float = 0.1
     accelerometer_bias: float = 0.05
+    """The same [m/s^2]."""
     angle_step: float = 3.0e-5
     speed_step: float = 0.004
-    speed: float = 0.02
-    force: float = 2.0
-    force_step: float = 1.0
+    """Resolution of a joint's angle [rad] and velocity [rad/s]."""
+    speed: float = 0.02  #: white noise on it [rad/s], own choice: five steps
+    force: float = 2.0  #: white noise on a foot's force [N]
+    force_step: float = 1.0  #: resolution of a foot's force [N]; the robot sends whole numbers
     latency: float = 0.002
+    """Age of what the controller is given [s], rounded to whole control periods; half of a round
+    trip of the robot's bus would be 0.001."""
 
 
 @subroutine

@@ -126,20 +126,14 @@ class Stairs(Terrain):
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE, count=COUNTED)
 class Blocks(Terrain):
-    """Blocks across the way, one behind the other.
-
-    Attributes:
-        height, length: of each [m].
-        gap: length [m] of the ground between two.
-        count: of them.
-        start: distance of the first one from the origin [m].
-    """
+    """Blocks across the way, one behind the other."""
 
     height: float = 0.1
     length: float = 1.0
-    gap: float = 1.0
-    count: int = 4
-    start: float = 0.8
+    """Of each [m]."""
+    gap: float = 1.0  #: length [m] of the ground between two
+    count: int = 4  #: of them
+    start: float = 0.8  #: distance of the first one from the origin [m]
 
     @property
     def end(self) -> float:
@@ -291,16 +285,12 @@ class Stones(_Pit):
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE)
 class Gap(_Pit):
-    """A gap across the way.
-
-    Attributes:
-        length, depth: of it [m].
-        start: distance from the origin [m].
-    """
+    """A gap across the way."""
 
     length: float = 0.2
     depth: float = 0.4
-    start: float = 0.8
+    """Of it [m]."""
+    start: float = 0.8  #: distance from the origin [m]
 
     @property
     def end(self) -> float:

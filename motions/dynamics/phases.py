@@ -121,14 +121,11 @@ class FullState:
 @typed(error=TimelineError)
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """How far a plan may be from what was asked before it counts as none.
-
-    Attributes:
-        position, angle: [m], 50 mm, and [rad], 8 deg unless said otherwise.
-    """
+    """How far a plan may be from what was asked before it counts as none."""
 
     position: float = 0.05
     angle: float = math.radians(8.0)
+    """[m], 50 mm, and [rad], 8 deg unless said otherwise."""
 
     def __post_init__(self) -> None:
         """Raise TimelineError for what is no tolerance."""

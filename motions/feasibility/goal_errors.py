@@ -79,30 +79,23 @@ def _of_written(span: DynamicSpan, places: _Places, model: RobotModel) -> Misses
 
 @dataclass(frozen=True, slots=True)
 class Departure:
-    """Of one part of a motion, which could not be done as it was written.
-
-    Attributes:
-        start, end: when [s] of the motion.
-        place: greatest distance [m] of the trunk, or of a foot that lands, from what was written.
-        subject: of what.
-        place_time: when [s].
-        angle, angle_time: greatest angle [rad] of the trunk from what was written, and when [s].
-        lag: how late [s] the trunk is as a whole; below 0, early.
-        foot_place: greatest distance [m] of a foot from what was written, in the air too.
-        foot, foot_time: of which foot, and when [s].
-    """
+    """Of one part of a motion, which could not be done as it was written."""
 
     start: float
     end: float
+    """When [s] of the motion."""
     place: float
-    subject: str
-    place_time: float
+    """Greatest distance [m] of the trunk, or of a foot that lands, from what was written."""
+    subject: str  #: of what
+    place_time: float  #: when [s]
     angle: float
     angle_time: float
-    lag: float
-    foot_place: float
+    """Greatest angle [rad] of the trunk from what was written, and when [s]."""
+    lag: float  #: how late [s] the trunk is as a whole; below 0, early
+    foot_place: float  #: greatest distance [m] of a foot from what was written, in the air too
     foot: str
     foot_time: float
+    """Of which foot, and when [s]."""
 
     @property
     def farther_foot(self) -> str:

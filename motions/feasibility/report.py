@@ -150,27 +150,18 @@ Least = tuple[Float[np.ndarray, " n"], Int[np.ndarray, " n"]]
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """One check over the whole motion.
+    """One check over the whole motion."""
 
-    Attributes:
-        check: which limit.
-        unit: of values, limits and margins.
-        subjects: what is looked at, one per column.
-        times: (n,) [s].
-        values, limits, margins: (n, k); a margin of nan says that there was nothing to check.
-        tight: margin below which a warning is due.
-        note: what else to say of a finding.
-    """
-
-    check: str
-    unit: str
-    subjects: tuple[str, ...]
-    times: Float[np.ndarray, " n"]
+    check: str  #: which limit
+    unit: str  #: of values, limits and margins
+    subjects: tuple[str, ...]  #: what is looked at, one per column
+    times: Float[np.ndarray, " n"]  #: (n,) [s]
     values: Float[np.ndarray, "n k"]
     limits: Float[np.ndarray, "n k"]
     margins: Float[np.ndarray, "n k"]
-    tight: float = 0.0
-    note: str = ""
+    """(n, k); a margin of nan says that there was nothing to check."""
+    tight: float = 0.0  #: margin below which a warning is due
+    note: str = ""  #: what else to say of a finding
     _least: Least | None = field(default=None, init=False, repr=False, compare=False)
 
     __repr__ = brief

@@ -229,24 +229,17 @@ _DARK = 0.6  # of a grid's colours: white letters above it
 @typed()
 @dataclass(frozen=True, slots=True)
 class Relation:
-    """An outcome over one parameter, or two.
-
-    Attributes:
-        over, outcome: the parameters, and what depends on them.
-        is_rate: it is a share of the runs, 0 to 1.
-        labels: the bins of each parameter, in words.
-        stats: mean, both ends of its 95 % interval, and number of runs, in each bin.
-        places: of one parameter: its mean in each bin.
-        dots: of one parameter and a number: both, of every run.
-    """
+    """An outcome over one parameter, or two."""
 
     over: tuple[str, ...]
     outcome: str
-    is_rate: bool
-    labels: tuple[tuple[str, ...], ...]
+    """The parameters, and what depends on them."""
+    is_rate: bool  #: it is a share of the runs, 0 to 1
+    labels: tuple[tuple[str, ...], ...]  #: the bins of each parameter, in words
     stats: Float[np.ndarray, "*bins 4"]
-    places: Float[np.ndarray, " k"]
-    dots: Float[np.ndarray, "n 2"]
+    """Mean, both ends of its 95 % interval, and number of runs, in each bin."""
+    places: Float[np.ndarray, " k"]  #: of one parameter: its mean in each bin
+    dots: Float[np.ndarray, "n 2"]  #: of one parameter and a number: both, of every run
 
 
 @typed()

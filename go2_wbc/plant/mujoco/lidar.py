@@ -38,26 +38,18 @@ GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE, noise=NOT_NEGATIVE, latency=NOT_NEGATIVE)
 class LidarConfig:
-    """Numbers of the lidar; Unitree's of the L1, but for the latency, which is a guess.
+    """Numbers of the lidar; Unitree's of the L1, but for the latency, which is a guess."""
 
-    Attributes:
-        rate: scans a second; with ``rays`` the L1's 21600 points a second.
-        rays: of a scan. One is taken in an instant; the L1 takes its time.
-        noise: standard deviation of a distance [m].
-        nearest, farthest: range [m].
-        latency: time [s] from a scan until it is told.
-        pitch: angle [rad] of its axis below the horizontal.
-        cone: angle [rad] of the rays with its axis, at most.
-    """
-
-    rate: float = 15.0
+    rate: float = 15.0  #: scans a second; with ``rays`` the L1's 21600 points a second
     rays: int = 1440
-    noise: float = 0.015
+    """Of a scan. One is taken in an instant; the L1 takes its time."""
+    noise: float = 0.015  #: standard deviation of a distance [m]
     nearest: float = 0.05
     farthest: float = 10.0
-    latency: float = 0.02
-    pitch: float = math.radians(45.0)
-    cone: float = math.radians(80.0)
+    """Range [m]."""
+    latency: float = 0.02  #: time [s] from a scan until it is told
+    pitch: float = math.radians(45.0)  #: angle [rad] of its axis below the horizontal
+    cone: float = math.radians(80.0)  #: angle [rad] of the rays with its axis, at most
 
     @property
     def place(self) -> Float[np.ndarray, "3"]:
@@ -81,29 +73,23 @@ class LidarConfig:
 @dataclass(frozen=True, slots=True)
 @ranged(POSITIVE, noise=NOT_NEGATIVE, latency=NOT_NEGATIVE)
 class DepthConfig:
-    """Numbers of the depth camera; range and angles of a RealSense D435, the others guessed.
+    """Numbers of the depth camera; range and angles of a RealSense D435, the others guessed."""
 
-    Attributes:
-        rate: pictures a second.
-        columns, rows: of a picture.
-        noise: standard deviation of a distance d, over d^2 [1/m]; the D435's is 0.08 pixels of 425
-            in its focal length, over the 5 cm between its eyes.
-        nearest, farthest: range [m].
-        latency: time [s] from a picture until it is told.
-        pitch: angle [rad] of its axis below the horizontal.
-        width, height: angles [rad] of view.
-    """
-
-    rate: float = 15.0
+    rate: float = 15.0  #: pictures a second
     columns: int = 48
     rows: int = 32
+    """Of a picture."""
     noise: float = 0.004
+    """Standard deviation of a distance d, over d^2 [1/m]; the D435's is 0.08 pixels of 425 in its
+    focal length, over the 5 cm between its eyes."""
     nearest: float = 0.3
     farthest: float = 3.0
-    latency: float = 0.03
-    pitch: float = math.radians(30.0)
+    """Range [m]."""
+    latency: float = 0.03  #: time [s] from a picture until it is told
+    pitch: float = math.radians(30.0)  #: angle [rad] of its axis below the horizontal
     width: float = math.radians(87.0)
     height: float = math.radians(58.0)
+    """Angles [rad] of view."""
 
     @property
     def rays(self) -> int:
