@@ -42,36 +42,29 @@ _Part = TypeVar("_Part")
 @typed()
 @dataclass(frozen=True, slots=True)
 class Config:
-    """The engine's numbers.
+    """The engine's numbers."""
 
-    Attributes:
-        wbc: whole-body controller.
-        locomotion: locomotion planner.
-        envelope: velocity commands that are followed. None, and so not configured: in simulation
-            that of the robot's profile, which was measured; where a real robot may be moved
-            (``beside_hardware``) the default of ``VelocityEnvelope``.
-        pose: poses of the trunk that are taken while walking.
-        safety: when to give up.
-        payload: estimate of what the robot carries.
-        estimator: of the state, for a plant that measures no pose: its maker passes it on.
-        feasibility: what a motion must keep to be played.
-        backend: whole-body back end: condensed, full or placo.
-        motor: what the motors are taken for: "torque-speed", or "ideal" for the peak torque at
-            every speed.
-        robot: name of the profile of the robot that they are for; ``of_robot`` has all of them.
-    """
-
-    wbc: WbcConfig = field(default_factory=WbcConfig)
-    locomotion: LocomotionConfig = field(default_factory=LocomotionConfig)
+    wbc: WbcConfig = field(default_factory=WbcConfig)  #: whole-body controller
+    locomotion: LocomotionConfig = field(default_factory=LocomotionConfig)  #: locomotion planner
     envelope: VelocityEnvelope | None = None
+    """Velocity commands that are followed. None, and so not configured: in simulation that of the
+    robot's profile, which was measured; where a real robot may be moved (``beside_hardware``) the
+    default of ``VelocityEnvelope``."""
     pose: PoseEnvelope = field(default_factory=PoseEnvelope)
-    safety: SafetyConfig = field(default_factory=SafetyConfig)
+    """Poses of the trunk that are taken while walking."""
+    safety: SafetyConfig = field(default_factory=SafetyConfig)  #: when to give up
     payload: PayloadConfig = field(default_factory=PayloadConfig)
+    """Estimate of what the robot carries."""
     estimator: EstimatorConfig = field(default_factory=EstimatorConfig)
+    """Of the state, for a plant that measures no pose: its maker passes it on."""
     feasibility: FeasibilityLimits = field(default_factory=FeasibilityLimits)
-    backend: str = "condensed"
+    """What a motion must keep to be played."""
+    backend: str = "condensed"  #: whole-body back end: condensed, full or placo
     motor: str = TORQUE_SPEED
+    """What the motors are taken for: "torque-speed", or "ideal" for the peak torque at every
+    speed."""
     robot: str = GO2
+    """Name of the profile of the robot that they are for; ``of_robot`` has all of them."""
 
     __repr__ = brief
 
