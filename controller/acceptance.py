@@ -66,7 +66,8 @@ class Acceptance:
         end: Limited = {}
         if plan.footsteps is not None:
             end = arrival(*played.end_error(snapshot), played.landings)
-        measured = {**at_rest, **_values(deviation), **_values(end)}
+        found = {name: value for name, (value, _) in {**deviation, **end}.items()}
+        measured = {**at_rest, **found}
         if not are_within(end):
             raise Aborted(f"{plan.name} ended elsewhere: {told(end)}", measured)
         if not are_within(deviation):
@@ -87,10 +88,6 @@ class Acceptance:
             reason = f"{self._plan.name} held no paw at its height: {', '.join(low)}"
             raise Aborted(reason, found)
         return found
-
-
-def _values(measured: Limited) -> Measurements:
-    return {name: value for name, (value, _) in measured.items()}
 
 
 def off_plan(deviation: Deviation, *, is_dynamic: bool = False) -> Limited:

@@ -212,7 +212,9 @@ def measure_motion(
     """
     truth.clear()
     said = go2.play(plan, check=False)
-    fall, dt = truth.fall() or _given_up(go2), truth.control_period
+    # It goes limp as soon as a fall cannot be stopped, before the trunk lies on the ground.
+    given_up = go2.last_outcome.reason if go2.mode in (Mode.FALLEN, Mode.DAMPED) else None
+    fall, dt = truth.fall() or given_up, truth.control_period
     recorded = during_motion(go2, truth, plan.name)
     shares = recorded.torque_shares(model)
     force = np.maximum(recorded.trunk_force, recorded.limb_force)
@@ -237,15 +239,6 @@ def measure_motion(
         paw_off=paw,
         landed_off=landed,
     )
-
-
-def _given_up(go2: GO2Controller) -> str | None:
-    """Why the controller let the robot go limp, or None.
-
-    It does so as soon as a fall cannot be stopped, and ``play`` returns before the trunk lies on
-    the ground: what the simulator says at that moment is no proof that the robot is up.
-    """
-    return go2.last_outcome.reason if go2.mode in (Mode.FALLEN, Mode.DAMPED) else None
 
 
 def during_motion(go2: GO2Controller, truth: GroundTruth, name: str) -> TruthRecording:

@@ -255,7 +255,9 @@ def _ingredients(function: Any, seen: set[int]) -> Iterator[str]:
     yield str(function.__module__)  # kept code names where each part of it comes from
     names: set[str] = set()
     for code in _codes(function.__code__):
-        constants = [c for c in code.co_consts if c != function.__doc__ and not _is_code(c)]
+        constants = [
+            c for c in code.co_consts if c != function.__doc__ and not isinstance(c, CodeType)
+        ]
         yield repr((code.co_code.hex(), constants, code.co_names, code.co_varnames))
         names |= set(code.co_names)
     known = dict(inspect.getclosurevars(function).nonlocals)
@@ -288,12 +290,8 @@ def _ingredient(name: str, value: Any, seen: set[int]) -> Iterator[str]:
 def _codes(code: CodeType) -> Iterator[CodeType]:
     yield code
     for constant in code.co_consts:
-        if _is_code(constant):
+        if isinstance(constant, CodeType):
             yield from _codes(constant)
-
-
-def _is_code(constant: object) -> bool:
-    return isinstance(constant, CodeType)
 
 
 def signature_of(routine: Written) -> Any:

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from controller.learning.tasks import LearningTask
 from controller.observation import KD, KP, OBSERVATION, RATE, TARGETS, Actuation, observed
@@ -141,7 +141,9 @@ class Expert:
         tau = truth.tau_asked[every + 1]  # what led to the next state
         targets = truth.q[every, 7:] + (tau + self.kd * truth.v[every, 6:]) / self.kp
         targets, tau = targets.mean(axis=1), tau.mean(axis=1)
-        time, ticked = truth.time[first], _nearest(recording.time, truth.time[first])
+        time = truth.time[first]
+        ticked = np.searchsorted(recording.time, time - 0.5 / _TICKS)
+        ticked = np.minimum(ticked, len(recording.time) - 1)
         asked = commands[np.searchsorted(commands[:, 0], time + 0.5 / _TICKS) - 1, 1:]
         stance = recording.stance[ticked]
         if math.isnan(phase):
@@ -186,12 +188,6 @@ def stride_phase(
     period = np.where(period < LONGEST_STRIDE, period, np.median(usual))
     turned = (time - starts[np.maximum(last, 0)]) / period
     return np.where(np.abs(turned) < 1.0, (turned + at_touchdown) % 1.0, 0.0)
-
-
-def _nearest(
-    times: Float[np.ndarray, " n"], wanted: Float[np.ndarray, " k"]
-) -> Int[np.ndarray, " k"]:
-    return np.minimum(np.searchsorted(times, wanted - 0.5 / _TICKS), len(times) - 1)
 
 
 def _state(truth: TruthRecording, row: int) -> RobotState:

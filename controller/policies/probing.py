@@ -157,19 +157,16 @@ def changes(side: Sidecar) -> Iterator[Change]:
     """
     yield from _orders(side)
     yield from _signs(side)
-    for key in ("action.scale", "action.kp", "action.kd", *_scales(side)):
+    scales = [f"scale of {term.name}" for term in side.terms]
+    for key in ("action.scale", "action.kp", "action.kd", *scales):
         for factor in FACTORS:
             yield scaled(side, key, factor)
-    for key in ("action.scale", *_scales(side)):
+    for key in ("action.scale", *scales):
         if "clock" not in key:
             yield scaled(side, key, -1.0)
     for term in side.terms:
         if term.name == "gravity" and term.scale[0] != 1.0:
             yield scaled(side, "scale of gravity", 1.0 / float(term.scale[0]))
-
-
-def _scales(side: Sidecar) -> list[str]:
-    return [f"scale of {term.name}" for term in side.terms]
 
 
 def _orders(side: Sidecar) -> Iterator[Change]:

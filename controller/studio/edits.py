@@ -178,14 +178,10 @@ def _template(order: Mapping[str, object]) -> Template:
     return replace(template, arguments={**template.arguments, **values})
 
 
-def _swap(source: Source, site: Site, order: Mapping[str, object]) -> Source:
-    return source.swap(site, -1 if order.get("step") == -1 else 1)
-
-
 _EDITS: Mapping[str, Callable[[Source, Site, Mapping[str, object]], Source]] = {
     "set": _set,
     "insert": _insert,
-    "swap": _swap,
+    "swap": lambda source, site, order: source.swap(site, -1 if order.get("step") == -1 else 1),
     "delete": lambda source, site, _: source.delete(site),
     "unroll": lambda source, site, order: unrolled(source, site, run_of(order)),
     "duplicate": lambda source, site, _: source.duplicate(site),

@@ -135,7 +135,8 @@ def solve_dense_qp(qp: DenseQp, solver: str) -> Float[np.ndarray, " n"]:
     if not qp.is_valid:
         # ProxQP ponders over a nan for seconds, and a nan bound would count as an open side.
         raise QpInfeasible(solver, "the problem holds a nan or an infinite number")
-    solve = {"active_set": _by_active_set, "proxqp": _by_proxqp}.get(solver, _by_qpsolvers)
+    own = {"active_set": lambda qp, _: solve_with_multipliers(qp)[0], "proxqp": _by_proxqp}
+    solve = own.get(solver, _by_qpsolvers)
     try:
         x = solve(qp, solver)
     except (ValueError, RuntimeError) as error:
@@ -162,10 +163,6 @@ def solve_with_multipliers(qp: DenseQp) -> tuple[Float[np.ndarray, " n"], Float[
     if outcome != SOLVED:
         raise QpInfeasible("active_set", MESSAGES[outcome])
     return x, y
-
-
-def _by_active_set(qp: DenseQp, _solver: str) -> Float[np.ndarray, " n"]:
-    return solve_with_multipliers(qp)[0]
 
 
 def _by_qpsolvers(qp: DenseQp, solver: str) -> Float[np.ndarray, " n"] | None:

@@ -201,7 +201,8 @@ def _placed(frames: Int[np.ndarray, " k"], onsets: Frames) -> Float[np.ndarray, 
     turned = _followed((last - notes)[::-1], weights[::-1], onsets[::-1])
     notes, weights = (last - turned[0])[::-1], turned[1][::-1]
     rows = np.arange(len(notes))
-    placed = [_line(rows[part] - row, notes[part], weights[part]) for row, part in _parts(rows)]
+    parts = [slice(max(row - NEIGHBOURS, 0), row + NEIGHBOURS + 1) for row in rows.tolist()]
+    placed = [_line(rows[part] - row, notes[part], weights[part]) for row, part in enumerate(parts)]
     return np.array([line[1] for line in placed]) * (HOP / RATE)
 
 
@@ -234,11 +235,6 @@ def _unevenness(notes: Times) -> float:
     """How far notes are from equal distances: the median of the distances from a line."""
     number = np.arange(len(notes))
     return float(np.median(np.abs(notes - np.polyval(np.polyfit(number, notes, 1), number))))
-
-
-def _parts(rows: Int[np.ndarray, " k"]) -> list[tuple[int, slice]]:
-    """Every beat with its neighbours."""
-    return [(row, slice(max(row - NEIGHBOURS, 0), row + NEIGHBOURS + 1)) for row in rows.tolist()]
 
 
 def _line(numbers: Int[np.ndarray, " k"], notes: Times, weights: Times) -> Float[np.ndarray, "2"]:
