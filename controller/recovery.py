@@ -30,6 +30,9 @@ REACHED_BACK = (-0.3, 3.4, -2.66)
 """Joint angles [rad] of a left leg folded past the back, and inwards."""
 PUSHING = (0.8, 3.4, -0.9)
 """Joint angles [rad] of a left leg stretched past the back and outwards: it lifts its side."""
+PUSHING_BESIDE = (-0.8, 3.4, -0.9)
+"""The same of a robot that lies on that side: what points past the back goes the other way."""
+ON_SIDE = (1.2, 2.0)  #: Rolls [rad] at which it lies on a side, as a flat one may
 OUTWARDS = 0.7  #: Hip angle [rad] at which a left leg swings past the trunk without touching it
 
 
@@ -104,8 +107,11 @@ def roll_over(loop: ControlLoop) -> Iterator[Behaviour]:
             has_freed = False
             nearer = 1 if loop.state.rpy[0] >= 0 else -1
             side = -nearer if rolls % 2 else nearer  # the legs of one side may be stuck
+            pushing = PUSHING
+            if rolls > 1 and ON_SIDE[0] < abs(loop.state.rpy[0]) < ON_SIDE[1]:
+                side, pushing = -nearer, PUSHING_BESIDE
             rolls += 1
-            reach, push = _one_side(side, REACHED_BACK, tucked), _one_side(side, PUSHING, tucked)
+            reach, push = _one_side(side, REACHED_BACK, tucked), _one_side(side, pushing, tucked)
             yield ServoJoints("reach back", ((0.5, reach), (0.1, reach)), kp=80.0)
             yield ServoJoints("push over", ((0.24, push), (0.4, push)), kp=80.0)
             yield _fold(tucked)

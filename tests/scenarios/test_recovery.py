@@ -7,6 +7,7 @@ import pytest
 
 from controller import GO2Controller
 from go2_wbc.plant import MujocoPlant
+from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.state import JointCommand
 from tests.unchecked import run_trials
 
@@ -34,6 +35,18 @@ def test_a_robot_that_was_dropped_at_any_roll_gets_up(roll_deg: int) -> None:
         assert go2.state.tilt < np.radians(6)
         assert go2.state.feet_in_contact.all()
         assert go2.telemetry.peak_speed_ratio < 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_go1_whose_sides_are_flat_gets_up_from_either_where_its_feet_slide(side: int) -> None:
+    plant = MujocoPlant(robot="go1", friction=0.5)
+    q = np.zeros(19)
+    q[2], q[3], q[6] = 0.147, side * np.sqrt(0.5), np.sqrt(0.5)
+    q[7:] = find_profile("go1").tucked_joints
+    plant.place(q)
+    with GO2Controller(plant=plant) as go2:
+        assert go2.recover(), go2.last_outcome.reason
 
 
 @pytest.mark.slow
