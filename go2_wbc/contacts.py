@@ -134,9 +134,8 @@ class Stride:
     """
 
     reach: float = 0.20  #: way [m] of the trunk over a standing foot
-    stance_min: float = 0.08
-    stance_max: float = 0.20
-    """Bounds [s] of the time that a foot stands."""
+    stance_min: float = 0.08  #: least time [s] that a foot stands
+    stance_max: float = 0.20  #: greatest time [s] that a foot stands
     swing: float = 0.20  #: time [s] of the swing at 1 m/s
     swing_slope: float = 0.01  #: what each m/s more adds to it [s^2/m]
 

@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+from unittest.mock import Mock
 from urllib.parse import unquote, urlsplit
 
 import pytest
@@ -200,6 +201,15 @@ def test_a_docstring_keeps_its_bars_and_its_indented_blocks() -> None:
         "    x: any.",
         "",
     ]
+
+
+def test_a_colon_of_a_field_splits_no_type_off() -> None:
+    from sphinx.application import Sphinx
+    from sphinx.ext.napoleon.docstring import GoogleDocstring
+
+    extension("plain_docstrings").setup(Mock(spec=Sphinx))
+    told = "Force [N] that counts: five deviations."
+    assert str(GoogleDocstring(told, what="attribute", name="force")) == told
 
 
 def test_a_name_is_found_as_sphinx_finds_it() -> None:

@@ -53,10 +53,9 @@ class MarginCurve:
 class Annotation:
     """A limit that one subject breaks, or nearly does."""
 
-    limit: str
-    subject: str
-    time: float
-    """Its name; joint, foot or part of the body; when [s] it is worst."""
+    limit: str  #: its name
+    subject: str  #: joint, foot or part of the body
+    time: float  #: when [s] it is worst
     text: str  #: value and limit in words
     is_broken: bool  #: otherwise the margin is only tight
     spans: tuple[tuple[float, float], ...]  #: start and end [s] of each stretch in which it is so

@@ -107,9 +107,8 @@ class Sidecar:
     default: Array12  #: joint angles [rad] where its actions are 0, and its joint positions
     action_scale: Array12  #: [rad] per action
     action_clip: float  #: actions are clipped to plus or minus this
-    kp: Array12
-    kd: Array12
-    """Stiffness [N m/rad] and damping [N m s/rad] of the joints."""
+    kp: Array12  #: stiffness of the joints [N m/rad]
+    kd: Array12  #: damping of the joints [N m s/rad]
     commands: CommandRanges  #: on which it was trained
     terms: tuple[Term, ...]  #: of the observation
     history: int  #: how many rows an observation holds, this one included

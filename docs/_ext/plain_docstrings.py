@@ -1,4 +1,4 @@
-"""Lets docstrings be plain text: a bar is a bar, and an indented block is shown as it is written.
+"""Lets docstrings be plain text: a bar is a bar, a colon a colon, a block as it is written.
 
 The docstrings follow Google's style and are read in the source most of the time, so they contain
 norms as ``|x|`` and equations as indented lines. Sphinx would take both for its own markup.
@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator
 
 from sphinx.application import Sphinx
+from sphinx.ext.napoleon.docstring import GoogleDocstring
 
 _LITERAL = re.compile(r"(``.*?``)")
 _SECTION = re.compile(r"[A-Z]\w*(?: \w+)?:$")
@@ -50,6 +51,7 @@ def _process(
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Register the step, before napoleon reads the sections."""
+    """Register the step, before napoleon reads the sections; of a field it splits no type off."""
+    GoogleDocstring._parse_attribute_docstring = GoogleDocstring._consume_to_end
     app.connect("autodoc-process-docstring", _process, priority=BEFORE_NAPOLEON)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -45,16 +45,13 @@ class SensorNoise:
     fifth), and of a consumer MEMS unit sampled at 500 Hz.
     """
 
-    position: float = 0.002
-    linear_velocity: float = 0.02
-    """Of the base [m], [m/s], as from an estimator or motion capture."""
+    position: float = 0.002  #: of the base [m], as from an estimator or motion capture
+    linear_velocity: float = 0.02  #: of the base [m/s], from the same
     orientation: float = 0.005  #: base orientation, rotation vector [rad]
-    gyro: float = 0.02
-    accelerometer: float = 0.1
-    """Angular velocity [rad/s] and specific force [m/s^2]."""
-    joint_position: float = 0.002
-    joint_velocity: float = 0.05
-    """Encoder [rad], and differentiated [rad/s]."""
+    gyro: float = 0.02  #: angular velocity [rad/s]
+    accelerometer: float = 0.1  #: specific force [m/s^2]
+    joint_position: float = 0.002  #: encoder [rad]
+    joint_velocity: float = 0.05  #: encoder, differentiated [rad/s]
     foot_force: float = 2.0  #: foot sensor [N]
 
     def corrupt_state(self, state: RobotState, rng: np.random.Generator) -> RobotState:
@@ -111,15 +108,12 @@ class SensorErrors:
     (angle 2 pi / 32768, speed 2 pi / 256 rad/s of the rotor, gear 6.33).
     """
 
-    gyro: float = 0.012
-    gyro_bias: float = 0.0175
-    """White noise per sample, and deviation of its bias [rad/s]."""
-    accelerometer: float = 0.1
-    accelerometer_bias: float = 0.05
-    """The same [m/s^2]."""
-    angle_step: float = 3.0e-5
-    speed_step: float = 0.004
-    """Resolution of a joint's angle [rad] and velocity [rad/s]."""
+    gyro: float = 0.012  #: white noise per sample [rad/s]
+    gyro_bias: float = 0.0175  #: deviation of its bias [rad/s]
+    accelerometer: float = 0.1  #: white noise per sample [m/s^2]
+    accelerometer_bias: float = 0.05  #: deviation of its bias [m/s^2]
+    angle_step: float = 3.0e-5  #: resolution of a joint's angle [rad]
+    speed_step: float = 0.004  #: resolution of a joint's velocity [rad/s]
     speed: float = 0.02  #: white noise on it [rad/s], own choice: five steps
     force: float = 2.0  #: white noise on a foot's force [N]
     force_step: float = 1.0  #: resolution of a foot's force [N]; the robot sends whole numbers

@@ -128,9 +128,8 @@ class Stairs(Terrain):
 class Blocks(Terrain):
     """Blocks across the way, one behind the other."""
 
-    height: float = 0.1
-    length: float = 1.0
-    """Of each [m]."""
+    height: float = 0.1  #: of each [m]
+    length: float = 1.0  #: of each [m]
     gap: float = 1.0  #: length [m] of the ground between two
     count: int = 4  #: of them
     start: float = 0.8  #: distance of the first one from the origin [m]
@@ -287,9 +286,8 @@ class Stones(_Pit):
 class Gap(_Pit):
     """A gap across the way."""
 
-    length: float = 0.2
-    depth: float = 0.4
-    """Of it [m]."""
+    length: float = 0.2  #: of it [m]
+    depth: float = 0.4  #: of it [m]
     start: float = 0.8  #: distance from the origin [m]
 
     @property

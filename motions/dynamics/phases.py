@@ -123,9 +123,8 @@ class FullState:
 class Tolerance:
     """How far a plan may be from what was asked before it counts as none."""
 
-    position: float = 0.05
-    angle: float = math.radians(8.0)
-    """[m], 50 mm, and [rad], 8 deg unless said otherwise."""
+    position: float = 0.05  #: [m]
+    angle: float = math.radians(8.0)  #: [rad]
 
     def __post_init__(self) -> None:
         """Raise TimelineError for what is no tolerance."""

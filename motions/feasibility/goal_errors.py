@@ -81,21 +81,18 @@ def _of_written(span: DynamicSpan, places: _Places, model: RobotModel) -> Misses
 class Departure:
     """Of one part of a motion, which could not be done as it was written."""
 
-    start: float
-    end: float
-    """When [s] of the motion."""
+    start: float  #: when it begins [s]
+    end: float  #: when it ends [s]
     place: float
     """Greatest distance [m] of the trunk, or of a foot that lands, from what was written."""
     subject: str  #: of what
     place_time: float  #: when [s]
-    angle: float
-    angle_time: float
-    """Greatest angle [rad] of the trunk from what was written, and when [s]."""
+    angle: float  #: greatest angle [rad] of the trunk from what was written
+    angle_time: float  #: when [s]
     lag: float  #: how late [s] the trunk is as a whole; below 0, early
     foot_place: float  #: greatest distance [m] of a foot from what was written, in the air too
-    foot: str
-    foot_time: float
-    """Of which foot, and when [s]."""
+    foot: str  #: of which foot
+    foot_time: float  #: when [s]
 
     @property
     def farther_foot(self) -> str:

@@ -156,10 +156,9 @@ class Series:
     unit: str  #: of values, limits and margins
     subjects: tuple[str, ...]  #: what is looked at, one per column
     times: Float[np.ndarray, " n"]  #: (n,) [s]
-    values: Float[np.ndarray, "n k"]
-    limits: Float[np.ndarray, "n k"]
-    margins: Float[np.ndarray, "n k"]
-    """(n, k); a margin of nan says that there was nothing to check."""
+    values: Float[np.ndarray, "n k"]  #: (n, k)
+    limits: Float[np.ndarray, "n k"]  #: (n, k)
+    margins: Float[np.ndarray, "n k"]  #: (n, k); nan says that there was nothing to check
     tight: float = 0.0  #: margin below which a warning is due
     note: str = ""  #: what else to say of a finding
     _least: Least | None = field(default=None, init=False, repr=False, compare=False)

@@ -231,9 +231,8 @@ _DARK = 0.6  # of a grid's colours: white letters above it
 class Relation:
     """An outcome over one parameter, or two."""
 
-    over: tuple[str, ...]
-    outcome: str
-    """The parameters, and what depends on them."""
+    over: tuple[str, ...]  #: the parameters
+    outcome: str  #: what depends on them
     is_rate: bool  #: it is a share of the runs, 0 to 1
     labels: tuple[tuple[str, ...], ...]  #: the bins of each parameter, in words
     stats: Float[np.ndarray, "*bins 4"]

@@ -44,9 +44,8 @@ class LidarConfig:
     rays: int = 1440
     """Of a scan. One is taken in an instant; the L1 takes its time."""
     noise: float = 0.015  #: standard deviation of a distance [m]
-    nearest: float = 0.05
-    farthest: float = 10.0
-    """Range [m]."""
+    nearest: float = 0.05  #: least distance seen [m]
+    farthest: float = 10.0  #: greatest [m]
     latency: float = 0.02  #: time [s] from a scan until it is told
     pitch: float = math.radians(45.0)  #: angle [rad] of its axis below the horizontal
     cone: float = math.radians(80.0)  #: angle [rad] of the rays with its axis, at most
@@ -76,20 +75,17 @@ class DepthConfig:
     """Numbers of the depth camera; range and angles of a RealSense D435, the others guessed."""
 
     rate: float = 15.0  #: pictures a second
-    columns: int = 48
-    rows: int = 32
-    """Of a picture."""
+    columns: int = 48  #: of a picture
+    rows: int = 32  #: of a picture
     noise: float = 0.004
     """Standard deviation of a distance d, over d^2 [1/m]; the D435's is 0.08 pixels of 425 in its
     focal length, over the 5 cm between its eyes."""
-    nearest: float = 0.3
-    farthest: float = 3.0
-    """Range [m]."""
+    nearest: float = 0.3  #: least distance seen [m]
+    farthest: float = 3.0  #: greatest [m]
     latency: float = 0.03  #: time [s] from a picture until it is told
     pitch: float = math.radians(30.0)  #: angle [rad] of its axis below the horizontal
-    width: float = math.radians(87.0)
-    height: float = math.radians(58.0)
-    """Angles [rad] of view."""
+    width: float = math.radians(87.0)  #: angle of view [rad]
+    height: float = math.radians(58.0)  #: angle of view [rad]
 
     @property
     def rays(self) -> int:
