@@ -23,7 +23,10 @@ The swing rises to an apex above both of its ends and the ground between them, a
 part's time is in proportion to its height. The foot moves ahead between two instants, which are the
 nearest to the swing's begin and to ``LANDED``, from which on the foot may touch, between which it
 clears the ground by ``OVER``. So the foot rises in front of a step, and moves ahead over the edge
-behind it before it descends; on the level it moves ahead all the time.
+behind it before it descends; on the level it moves ahead all the time. A foot that comes down from
+a step arrives above its place early enough that the back of the calf clears the edge all the way by
+``CLEARANCE``: if it still moved ahead on its way down, the calf lay on the edge of a block of 20
+cm, the foot hung 6 cm above the ground as its stance began, and the trunk fell onto that corner.
 """
 
 from __future__ import annotations
@@ -55,6 +58,8 @@ LOWERING, EARLIER, BEHIND = 300.0, 0.06, 0.03
 hip is there, and how far [m] the back of the calf, and what the map is off, lie behind its axis.
 With more of them feet wait too long, and the robot is stretched over two steps: of 20 runs over
 stairs of 20 cm 10 to 14 were done instead of 15."""
+POINTS = 8
+"""Of a calf that are looked at. The edge of a block lay between three of them, 7 cm apart."""
 LATEST, SLEW, RISE, AGAIN = 0.6, 2.5, 1.0, 0.01
 """Share of a swing in which footholds are chosen, speeds [m/s] at which they and a swing's top
 move, and time [s] between two choices."""
@@ -121,8 +126,8 @@ def calf_miss(
     back = bend * dz
     up = 0.5 * dz + bend * (dx * ahead[0] + dy * ahead[1])
     worst = 0.0
-    for k in range(1, 4):
-        share = k / 3.0
+    for k in range(1, POINTS + 1):
+        share = k / POINTS
         px = foot[0] + share * (0.5 * dx - back * ahead[0]) - behind * ahead[0]
         py = foot[1] + share * (0.5 * dy - back * ahead[1]) - behind * ahead[1]
         ground = height_at(m, px, py)
@@ -145,6 +150,16 @@ def lowering_miss(
 
 
 @subroutine
+def hip_of(leg: int, now: Snapshot, c: Walk) -> V3:
+    """Where the hip of a leg is [m]."""
+    hip = now.q[:3].copy()
+    for i in range(3):
+        for k in range(3):
+            hip[i] += now.R_world_base[i, k] * c.p_base_hips[leg, k]
+    return triple(hip)
+
+
+@subroutine
 def choose(
     leg: int,
     now: Snapshot,
@@ -163,12 +178,9 @@ def choose(
     cosine, sine = np.cos(yaw), np.sin(yaw)
     v_x, v_y = world_velocity(s.trunk)
     climb = s.ground.slope[0] * v_x + s.ground.slope[1] * v_y
-    hip, stance = now.q[:3].copy(), s.clock.duty * s.clock.period
-    for i in range(3):
-        for k in range(3):
-            hip[i] += now.R_world_base[i, k] * c.p_base_hips[leg, k]
+    stance = s.clock.duty * s.clock.period
     way = (stance * v_x, stance * v_y, stance * climb)
-    at = plus_scaled(triple(hip), spans[1] / stance, way)
+    at = plus_scaled(hip_of(leg, now, c), spans[1] / stance, way)
     before = plus_scaled(at, -EARLIER / stance, way)
     best, kept = np.inf, triple(step.chosen)
     for n in range(-1, (BACK + ALONG + 1) * (2 * ACROSS + 1)):
@@ -233,7 +245,9 @@ def top_of(leg: int, s: Planner, c: Walk, m: HeightMap) -> float:
 
 
 @subroutine
-def shape(leg: int, s: Planner, c: Walk, m: HeightMap) -> None:
+def shape(
+    leg: int, now: Snapshot, s: Planner, c: Walk, m: HeightMap, spans: tuple[float, float]
+) -> None:
     """Find the top of a swing, when it is reached, and when the foot goes ahead."""
     foot = s.feet[leg]
     swing, step = foot.swing, foot.step
@@ -243,6 +257,10 @@ def shape(leg: int, s: Planner, c: Walk, m: HeightMap) -> None:
     step.peak = min(max(up / (up + down), 0.3), 0.7)
     length = max(np.hypot(b[0] - a[0], b[1] - a[1]), TIE)
     ahead_x, ahead_y = r * (b[0] - a[0]) / length, r * (b[1] - a[1]) / length
+    yaw, (v_x, v_y) = s.trunk.yaw, world_velocity(s.trunk)
+    heading = np.cos(yaw), np.sin(yaw)
+    way = (v_x, v_y, s.ground.slope[0] * v_x + s.ground.slope[1] * v_y)
+    is_lowered, hip = a[2] - b[2] > STEP, hip_of(leg, now, c)
     best = np.inf
     for wait in range(WAITS + 1):
         for early in range(WAITS + 1):
@@ -261,6 +279,11 @@ def shape(leg: int, s: Planner, c: Walk, m: HeightMap) -> None:
                     ground = height_at(m, px + k * side * ahead_x, py + k * side * ahead_y)
                     if ground > base - r + OVER:
                         cost += max(ground + OVER - z + r, 0.0) / OVER
+                if is_lowered and u > step.peak:
+                    at = plus_scaled(hip, u * (spans[0] + spans[1]) - spans[0], way)
+                    cost += calf_miss(m, at, (px, py, z), heading, BEHIND, c) / OVER
+                if cost >= best:
+                    break
             if cost < best:
                 best, step.begin, step.end = cost, begin, end
 
@@ -299,7 +322,7 @@ def swing_by_sight(
         if is_new:
             step.goal[:] = step.chosen
         if progress <= SHAPED or is_new:
-            shape(leg, s, c, m)
+            shape(leg, now, s, c, m, spans)
         elif progress < step.peak:
             off = top_of(leg, s, c, m) - step.top
             step.top += min(max(off, -RISE * AGAIN), RISE * AGAIN)

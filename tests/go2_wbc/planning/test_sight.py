@@ -21,7 +21,16 @@ from go2_wbc.planning.sight import (
     steps_by_sight,
     way_ahead,
 )
-from go2_wbc.planning.sighted_steps import NEAR, OVER, choose, swing_by_sight
+from go2_wbc.planning.sighted_steps import (
+    BEHIND,
+    NEAR,
+    OVER,
+    calf_miss,
+    choose,
+    hip_of,
+    shape,
+    swing_by_sight,
+)
 from go2_wbc.plant.terrain import DOWN, Blocks, Gap, Ramp, Slope, Stairs, Stones, Terrain
 from go2_wbc.reference import SWING
 from go2_wbc.robot.model import RobotModel
@@ -193,6 +202,59 @@ def test_a_foot_waits_on_a_high_step_until_its_hip_has_gone_on(
     now = MODEL.snapshot(state_of(q))
     choose(leg, now, state, walking._walk, heights, (0.0, 0.25), blind, math.inf)
     assert (state.feet[leg].step.chosen[0] < edge) == waits
+
+
+@pytest.mark.parametrize("beyond", [0.15, 0.17])
+@pytest.mark.parametrize("leg", [0, 2])
+def test_the_calf_passes_the_edge_of_the_step_that_its_foot_comes_down_from(
+    leg: int, beyond: float
+) -> None:
+    """It lay on the edge of a block; the foot hung above the ground, and the robot fell."""
+    edge, speed, duration, y = 0.20, 0.43, 0.25, 1.7 * MODEL.p_base_hips[leg][1]
+    heights = exact_map(Stairs(0.20, 1, 0.31, start=edge, way=DOWN))
+    walking, q = planner(heights), standing_q(0.25)
+    q[0] = edge + 0.06 - speed * duration - MODEL.p_base_hips[leg][0]
+    state, now = walking._state, MODEL.snapshot(state_of(q))
+    step, state.trunk.velocity[0] = state.feet[leg].step, speed
+    state.feet[leg].swing.start[:] = edge - 0.10, y, FOOT
+    step.chosen[:] = step.goal[:] = edge + beyond, y, FOOT - 0.20
+    step.is_sighted, step.next = True, math.inf
+    shape(leg, now, state, walking._walk, heights, (0.0, duration))
+    hip, rooms = np.array(hip_of(leg, now, walking._walk)), []
+    for elapsed in np.arange(0.0, duration, 0.01).tolist():
+        spans, rows = (elapsed, duration - elapsed), np.zeros((3, 3))
+        swing_by_sight(leg, now, state, walking._walk, heights, spans, step.chosen, 0.0, *rows)
+        to_hip = hip + [speed * elapsed, 0.0, 0.0] - rows[0]
+        rooms.append(room_at_calf(to_hip[[0, 2]], np.array([edge, 0.0]) - rows[0][[0, 2]]))
+    assert min(rooms) > 0.016  # a calf is 1.2 cm thick to either side
+
+
+@pytest.mark.parametrize("height", [0.21, 0.25])
+def test_no_edge_lies_between_the_points_of_a_calf_that_are_looked_at(height: float) -> None:
+    """Of three points none was near the edge of a block that the calf lay on."""
+    heights, hip, near = (
+        exact_map(Stairs(0.20, 1, 0.31, start=0.2, way=DOWN)),
+        (0.25, 0.0, height),
+        0,
+    )
+    walk = planner(heights)._walk
+    for beyond in np.arange(0.06, 0.20, 0.01).tolist():
+        for lowered in (1 / 3, 0.5, 2 / 3):
+            foot = (0.2 + beyond, 0.0, FOOT - 0.2 * lowered)
+            x, _, z = np.subtract(hip, foot).tolist()
+            if room_at_calf(np.array([x, z]), np.array([-beyond, -foot[2]])) < 0.02:
+                assert calf_miss(heights, hip, foot, (1.0, 0.0), BEHIND, walk) > 0.02
+                near += 1
+    assert near > 10
+
+
+def room_at_calf(to_hip: np.ndarray, to_edge: np.ndarray) -> float:
+    """How far [m] behind a calf's axis an edge is; hip and edge from the foot, ahead and up."""
+    far, link = float(np.linalg.norm(to_hip)), 0.213
+    bend = math.sqrt(max(link**2 - 0.25 * far**2, 0.0)) / far
+    knee = 0.5 * to_hip + bend * np.array([-to_hip[1], to_hip[0]])
+    along, aside = knee @ to_edge / link, (knee[0] * to_edge[1] - knee[1] * to_edge[0]) / link
+    return float(aside) if 0.0 < along < link else math.inf
 
 
 @pytest.mark.parametrize("speed", [-0.2, 0.0, 0.2])
