@@ -3,7 +3,7 @@
 import signal
 import typing
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
 from types import FrameType
@@ -22,18 +22,23 @@ from go2_wbc.robot.estimator import StateEstimator
 from go2_wbc.robot.latency import LAGS, Lag
 from go2_wbc.robot.motor import JointFriction
 from go2_wbc.robot.payload_estimation import PayloadEstimator
-from go2_wbc.robot.state import Snapshot
+from go2_wbc.robot.rigid_body import Payload
+from go2_wbc.robot.state import SensorReading, Snapshot
 from go2_wbc.wbc.controller import WholeBodyController
 from tests.engine_helpers import MODES, random_state
 from tests.go2_wbc.test_recorded import MODEL, sensed, walked
 from tests.recorded import assert_as_recorded
 
 FILE = Path(__file__).with_name("recorded_kernels.json")
-DRAWS, KEPT = 24, 4  #: Calls of each function, and what is kept of them
+DRAWS, KEPT = 36, 4  #: Calls of each function, and what is kept of them
 APART = 90  #: Ticks from one moment of a walk that is taken to the next
-CHANGES = (0.0, 0.02, 0.2)  #: By what share numbers of a walk are changed at most
+CHANGES = (0.0, 0.02, 0.2, 2.0)  #: By what share numbers of a walk are changed at most
 FLIPPED = 0.03  #: Share of what may be flags that say the opposite of what a walk has
 ROUNDING = 1e-12  #: What is less is 0 on some processor
+NOT_ZERO = (0.0, 0.0, 0.05, 0.3)  #: Share of what is 0 on a walk that is something else
+UNKNOWN = 0.05  #: Share of a map's cells
+NOT_A_NUMBER = 0.1  #: Share of what sensors read that is none
+SMALL = 1e-4  #: What is greater is told by its ratio to others, so that none outweighs the rest
 LENGTH = 40  #: Of an axis that may have any length
 LEFT_OUT = (
     *("planning.force_mpc.plan_forces", "planning.force_mpc.apply_force_plan"),
@@ -87,7 +92,8 @@ def moments(name: str) -> Iterator[dict[type, Any]]:
         payload.update(now)
         if tick % APART == 0:
             wbc.solve(now, reference)
-            parts = (vars(one).values() for one in (planner, estimator, wbc, payload, MODEL))
+            whole = planner, estimator, estimator.watch, wbc, payload, MODEL
+            parts = (vars(one).values() for one in whole)
             todo = [Target.of(reference.row), now, *(part for each in parts for part in each)]
             yield dict(rows_in(todo))
 
@@ -103,7 +109,8 @@ def rows_in(todo: list[Any]) -> Iterator[tuple[type, Any]]:
 
 
 SEEING, BLIND = [*moments("up stairs")], [*moments("trot"), *moments("at once")]
-MOMENTS = [*SEEING, *(SEEING[0] | moment for moment in BLIND)]
+KNOWN = {HeightMap: SEEING[-1][HeightMap]}
+MOMENTS = [*SEEING, *(SEEING[0] | moment | KNOWN for moment in BLIND)]
 
 
 class Draw:
@@ -121,7 +128,8 @@ class Draw:
         if typing.get_origin(hint) is typing.Annotated:
             return self.value(typing.get_args(hint)[0])
         if hint is float:
-            return np.float64(rng.choice([rng.uniform(0.0, 1.0), rng.normal()]))
+            any_size = rng.choice([1.0, 1.0, -1.0]) * 10.0 ** rng.uniform(-3.0, 2.0)
+            return np.float64(rng.choice([rng.uniform(0.0, 1.0), rng.normal(), any_size]))
         if hint is int:
             return int(rng.integers(0, 4))
         if hint is bool:
@@ -143,8 +151,9 @@ class Draw:
     def _record(self, kind: Any) -> Any:  # noqa: ANN401 - of any kind
         """Of drawn numbers; what a walk has of a kind is that, more or less changed."""
         rng, size = self._rng, layout_of(kind).size
-        if kind is Snapshot and self._change == CHANGES[-1] and rng.random() < 0.7:
-            now, leg = MODEL.snapshot(random_state(rng)), rng.integers(4)
+        if kind is Snapshot and self._change >= CHANGES[-2] and rng.random() < 0.7:
+            carried = Payload(rng.uniform(0.0, 8.0), tuple(rng.uniform(-0.1, 0.1, 3).tolist()))
+            now, leg = MODEL.snapshot(random_state(rng), carried), rng.integers(4)
             now.J_contacts[leg, 2] *= rng.random() < 0.7  # else the leg is stretched
             return now
         if kind in self._moment:
@@ -155,7 +164,15 @@ class Draw:
                 is_number = np.isfinite(row) & (row != np.round(row))
                 row = np.where(is_number, (1.0 + self._change * factors) * row, row)
                 row = np.where(np.isin(row, (0.0, 1.0)) & (others < FLIPPED), 1.0 - row, row)
+                share = NOT_ZERO[CHANGES.index(self._change)]
+                is_other = (row == 0.0) & (rng.random(row.size) < share)
+                row = np.where(is_other, rng.normal(scale=0.2, size=row.size), row)
+            if kind is SensorReading and self._change == CHANGES[1]:
+                row[rng.random(row.size) < NOT_A_NUMBER] = np.nan
             record = _looking_at(kind, row)
+            if kind is HeightMap and self._change >= CHANGES[-2]:
+                record.height[:] += np.kron(rng.normal(scale=0.1, size=(20, 20)), np.ones((8, 8)))
+                record.name[rng.random(record.name.shape) < UNKNOWN] = 0.0
             if kind is Target and rng.random() < 0.5:
                 record.legs[:], record.force_weight = MODES[rng.integers(len(MODES))], 0.0
             return record
@@ -183,6 +200,13 @@ def flat(*values: Any) -> Iterator[np.ndarray]:  # noqa: ANN401 - of any kind
             yield from flat(*value)
         elif value is not None:
             yield np.asarray(getattr(value, "row", value), dtype=float).ravel()
+
+
+def summed(values: Iterable[np.ndarray]) -> float:
+    """A number that each of these numbers changes by as much, whatever its size."""
+    numbers = np.concatenate([np.zeros(0), *values])
+    numbers = np.nan_to_num(numbers, nan=-7.0, posinf=1e9, neginf=-1e9)
+    return float(np.arcsinh(numbers / SMALL) @ np.cos(np.arange(numbers.size)))
 
 
 def too_long(_signal: int, _frame: FrameType | None) -> None:
@@ -213,11 +237,6 @@ def test_a_compiled_function_gives_as_plain_python_what_is_recorded(name: str) -
         with np.errstate(invalid="ignore"):  # inf less inf
             changes = [end - begun for end, begun in zip(flat(*given), start, strict=True)]
         changes = [each for each in changes if each.any()]  # a map that stays would hide the rest
-        all_of_it = [np.zeros(0), *made, *changes]
-        told[draw % KEPT].append(
-            np.arcsinh(np.concatenate(all_of_it))
-        )  # so that none outweighs all
+        told[draw % KEPT] += [*made, *changes]
     assert failed <= DRAWS / 2, "what is drawn for it is not what it takes"
-    assert_as_recorded(
-        FILE, name, {str(group): np.concatenate(each) for group, each in enumerate(told)}
-    )
+    assert_as_recorded(FILE, name, {str(n): summed(each) for n, each in enumerate(told)})
