@@ -8,6 +8,7 @@ import pytest
 import motions
 from benchmarks.validation_set.physics import play
 from controller import GO2Controller
+from controller.behaviours.standing import Standing
 from go2_wbc.errors import DynamicMotionRefused, MotionInfeasible, StanceMismatch
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
@@ -146,3 +147,4 @@ def test_a_motion_is_played_as_often_as_asked() -> None:
         assert go2.play(dip, times=3), go2.last_outcome.reason
         assert go2.state.time - start >= 3 * 0.8
         assert go2.last_outcome.duration >= 3 * 0.8
+        assert isinstance(go2._pilot._loop.behaviour, Standing), "it keeps its balance afterwards"

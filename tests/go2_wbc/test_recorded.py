@@ -227,6 +227,7 @@ def test_what_errs_senses_as_recorded() -> None:
             imu = ImuSample(now.state.q[3:7], now.state.v[3:6], rng.normal(size=3) + [0, 0, 9.8])
             state, felt = sense.sense(now.state, imu)
             rows["state"].append([*state.q, *state.v, *state.foot_forces])
+            np.testing.assert_array_equal(felt.quaternion, state.q[3:7])
             rows["imu"].append([*felt.gyro, *felt.accelerometer])
             rows["noisy"].append(SensorNoise().corrupt_state(now.state, rng).q)
         assert_as_recorded(FILE, f"senses {name}", kept(rows))

@@ -6,6 +6,7 @@ from go2_wbc.planning.height_map import (
     CELLS,
     DOWNS,
     LAYER,
+    RATE,
     STOOD,
     HeightMap,
     cells,
@@ -90,6 +91,8 @@ def test_feet_move_the_map_and_write_what_is_not_known() -> None:
     assert len(cells(heights)) == 4 * 9
     heights.height[heights.name != 0.0] += 0.02  # what drift does
     lifted = np.array([True, False, False, True])
+    feel(heights, now, lifted, 0.002)
+    assert heights.shift == pytest.approx(-RATE * 0.002 * 0.02)
     for _ in range(2500):
         feel(heights, now, lifted, 0.002)
     np.testing.assert_allclose(at(heights, *here), ground, atol=0.001)

@@ -1,32 +1,46 @@
 """Planes, ways, footholds and swings on terrains that are known exactly."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
-from go2_wbc.planning.height_map import HeightMap
+from go2_wbc.planning.ground import Ground
+from go2_wbc.planning.height_map import CELL, HeightMap, cells
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.planning.sight import (
     AGAIN,
     DROP,
+    FAR,
     FLIGHT_SPEED,
     LIFT,
     RISE,
     SPEED,
     STOP,
     Sight,
+    fitted_plane,
     steps_by_sight,
     way_ahead,
 )
 from go2_wbc.planning.sighted_steps import (
     BEHIND,
+    CLEARANCE,
+    HIGHER,
+    LANDED,
+    LANDS,
     NEAR,
+    NEAR_ENOUGH,
     OVER,
+    STEP,
+    WAIT,
+    WAITS,
     calf_miss,
     choose,
+    edge_cost,
+    height_to_land,
     hip_of,
     shape,
     swing_by_sight,
@@ -41,6 +55,7 @@ from tests.go2_wbc.planning.seen import exact_map, true_heights
 MODEL, CONFIG = RobotModel(), LocomotionConfig()
 FOOT = MODEL.foot_radius
 AHEAD = (1.0, 0.0, 0.9)
+EXACT = 1e-9  # rounding
 
 
 @pytest.mark.parametrize(
@@ -67,6 +82,136 @@ def test_a_way_ends_in_front_of_what_is_too_high_too_deep_or_too_wide(
     if ends and terrain is not None:
         start: float = getattr(terrain, "start")  # noqa: B009  # every one of these has it
         assert end == pytest.approx(start, abs=0.06)
+
+
+def level(*, aside: float = 0.35) -> HeightMap:
+    """A map of known ground at 0."""
+    heights = exact_map(None, aside=aside)
+    heights.height[:] = 0.0
+    return heights
+
+
+def raised(
+    heights: HeightMap, by: float, x: tuple[float, float], y: tuple[float, float]
+) -> HeightMap:
+    """With the known cells raised whose middles lie between these; nan: they are unknown."""
+    known, middle = heights.name != 0.0, cells(heights)
+    is_there = (middle[:, 0] > x[0]) & (middle[:, 0] < x[1])
+    is_there &= (middle[:, 1] > y[0]) & (middle[:, 1] < y[1])
+    heights.height[known] += np.where(is_there, by, 0.0)
+    heights.name[np.isnan(heights.height)] = 0.0
+    return heights
+
+
+@pytest.mark.parametrize("left", [-0.3, -0.15, 0.0, 0.15, 0.3])
+def test_a_post_ends_the_way_of_the_trunk_and_of_the_feet_and_none_beside_them(left: float) -> None:
+    heights = raised(level(aside=0.5), 0.4, (0.7, 0.8), (left - 0.03, left + 0.03))
+    what, end = way_ahead(heights, 0.0, 0.0, AHEAD, 0.0)
+    assert (what, end) == ((RISE, pytest.approx(0.7)) if abs(left) < 0.2 else (0.0, FAR))
+
+
+@pytest.mark.parametrize("yaw", [0.0, 2.0])
+def test_the_plane_of_even_ground_is_found_wherever_the_robot_is(yaw: float) -> None:
+    """A pit leaves it as it is."""
+    heights, slope, at = level(aside=1.0), np.array([0.5, -0.3]), np.array([0.4, 0.2])
+    heights.height[heights.name != 0.0] = cells(heights)[:, :2] @ slope
+    raised(heights, -1.0, (0.3, 0.4), (0.0, 0.1))
+    feet = np.zeros((4, 3))
+    feet[:, :2] = at + [[0.2, 0.1], [0.2, -0.1], [-0.2, 0.1], [-0.2, -0.1]]
+    feet[:, 2] = FOOT + feet[:, :2] @ slope
+    ground, plane = Ground(p_met=feet), np.zeros(3)
+    assert fitted_plane(ground, heights, at[0], at[1], yaw, FOOT, plane)
+    np.testing.assert_allclose(plane, [at @ slope, *slope], atol=0.01)
+    assert not fitted_plane(ground, heights, 2.4, 2.2, yaw, FOOT, plane)
+
+
+@pytest.mark.parametrize(
+    ("height", "cells_off", "distance"),
+    [
+        (0.0, 1, NEAR_ENOUGH),
+        (STEP, 1, NEAR_ENOUGH),  # no edge yet
+        (-STEP, 1, NEAR_ENOUGH),
+        (1.01 * STEP, 1, CELL + HIGHER),
+        (-1.01 * STEP, 1, CELL),
+        (-1.01 * STEP, 3, 3.0 * CELL),
+        (math.nan, 2, 2.0 * CELL),
+        (1.01 * STEP, 3, NEAR_ENOUGH),
+    ],
+)
+@pytest.mark.parametrize("way", [(1, 0), (-1, 0), (0, 1), (0, -1)])
+def test_an_edge_costs_by_its_distance_and_a_step_by_its_height(
+    height: float, cells_off: int, distance: float, way: tuple[int, int]
+) -> None:
+    here = 0.5 * CELL
+    (x, y), off = (here + CELL * cells_off * np.array(way)).tolist(), 0.01
+    heights = raised(level(), height, (x - off, x + off), (y - off, y + off))
+    near, spread = edge_cost(heights, here, here, 0.0)
+    assert near == pytest.approx(((NEAR_ENOUGH - distance) / (NEAR_ENOUGH - NEAR)) ** 2)
+    assert spread == (abs(height) if abs(height) <= STEP else 0.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_calf_lies_between_the_foot_and_a_knee_that_both_links_reach(seed: int) -> None:
+    rng, ground = np.random.default_rng(seed), level()
+    walk = planner(ground)._walk
+    d, phi, yaw = rng.uniform(0.15, 0.4), rng.uniform(1.0, 2.1), rng.uniform(-3.0, 3.0)
+    ahead, along = (math.cos(yaw), math.sin(yaw)), d * math.cos(phi)
+    foot = (0.1, 0.0, 0.05)
+    hip = (foot[0] + along * ahead[0], foot[1] + along * ahead[1], foot[2] + d * math.sin(phi))
+    knee = foot[2] + walk.link * math.sin(phi + math.acos(0.5 * d / walk.link))  # it is behind
+    lowest = foot[2] + (knee - foot[2]) / 3.0
+    for height, missing in ((0.3, 0.3 + CLEARANCE - lowest), (lowest - CLEARANCE - 0.01, 0.0)):
+        ground.shift = height
+        assert calf_miss(ground, hip, foot, ahead, 0.0, walk) == pytest.approx(missing)
+
+
+@pytest.mark.parametrize(
+    ("x", "z", "above"), [(0.0, 0.31, 0.01), (0.0, 0.31 + LANDS, 0.0), (9.0, 0.31, 0.0)]
+)
+def test_a_foot_lands_near_the_map_only(x: float, z: float, above: float) -> None:
+    heights = level()
+    heights.shift = 0.3
+    assert height_to_land(heights, x, 0.0, z) == pytest.approx(above)
+
+
+def swinging(heights: HeightMap) -> tuple[LocomotionPlanner, Any]:
+    """A planner whose front left foot swings ahead by 0.31 m, and the foot."""
+    walking = planner(heights)
+    foot, y = walking._state.feet[0], MODEL.p_base_feet_nominal[0, 1]
+    foot.swing.start[:], foot.step.goal[:] = (0.0, y, FOOT), (0.31, y, FOOT)
+    foot.step.chosen[:], foot.step.is_sighted, foot.step.end = foot.step.goal, True, LANDED
+    return walking, foot
+
+
+@pytest.mark.parametrize(
+    ("wall", "from_above", "begin", "end"),
+    [
+        ((2.0, 2.1), 0.0, 0.0, LANDED),
+        ((0.02, 0.06), 0.0, (WAITS - 1) * WAIT, LANDED),
+        ((0.24, 0.28), 0.1, 0.0, LANDED - WAITS * WAIT),
+    ],
+    ids=["none", "before the foot", "before its goal, which is lower"],
+)
+def test_a_foot_rises_before_it_goes_over_a_wall_and_is_over_it_before_it_comes_down(
+    wall: tuple[float, float], from_above: float, begin: float, end: float
+) -> None:
+    heights = raised(level(), 0.15, wall, (-1.0, 1.0))
+    walking, foot = swinging(heights)
+    foot.swing.start[2] += from_above
+    shape(0, walking._state, walking._walk, heights)
+    assert (foot.step.begin, foot.step.end) == pytest.approx((begin, end))
+
+
+@pytest.mark.parametrize(("elapsed", "moved"), [(0.1, 0.05), (0.2, 0.05), (0.23, 0.025)])
+def test_a_foothold_moves_the_less_the_later_it_is(elapsed: float, moved: float) -> None:
+    """The blind one is 0.1 m farther: half of the way costs least, if it may be gone."""
+    heights, rows = level(), np.zeros((3, 3))
+    walking, foot = swinging(heights)
+    before, spans = foot.step.goal.copy(), (elapsed, 0.4 - elapsed)
+    blind = before + [0.1, 0.0, 0.0]
+    walk, state = walking._walk, walking._state
+    swing_by_sight(0, standing(), state, walk, heights, spans, blind, 0.0, *rows)
+    np.testing.assert_allclose(foot.step.chosen - before, [moved, 0.0, 0.0], atol=EXACT)
 
 
 @pytest.mark.parametrize("y", [-0.05, 0.0, 0.04, 0.1])
@@ -126,7 +271,7 @@ def test_between_two_looks_the_plane_is_carried_along_with_the_robot() -> None:
             assert height - before == pytest.approx(0.002 * slope)
         assert slope == pytest.approx(math.tan(0.38), abs=0.03)
         before = height
-    assert looks == pytest.approx(200 * 0.002 / AGAIN, abs=2)
+    assert looks == round(200 * 0.002 / AGAIN)
 
 
 @pytest.mark.parametrize(

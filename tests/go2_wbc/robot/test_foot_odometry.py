@@ -236,6 +236,7 @@ def test_the_ground_is_where_a_foot_met_it_once_that_has_settled(
     foot.place[2], foot.age = -0.29, after * C.landing_time
     see_ground(f, foot, 1, force, before * C.landing_time, radius, level, C)
     assert foot.height_off == (pytest.approx(0.004 - ground) if looks else np.inf)
+    assert foot.height_variance == (C.height**2 if looks else 0.0)
 
 
 TILT = np.radians(20.0)

@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import Snapshot
+from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.constraints import (
+    Constraints,
     FloatingBaseDynamics,
     FrictionPyramid,
     JointLimits,
@@ -143,6 +145,14 @@ def test_only_planned_forces_are_kept_in_the_cone() -> None:
 
 LIMITS = JointLimits(MODEL.q_lower, MODEL.q_upper, MODEL.speed_limits, BRAKING, HORIZON)
 MIDDLE = (MODEL.q_lower + MODEL.q_upper) / 2
+
+
+def test_joints_stop_a_margin_before_their_ends_and_go_a_share_of_their_speed() -> None:
+    config = WbcConfig(joint_margin=0.05, speed_share=0.8)
+    limits = Constraints.of(config, MODEL, MODEL.motor).joint
+    np.testing.assert_allclose(limits.q_lower, MODEL.q_lower + 0.05)
+    np.testing.assert_allclose(limits.q_upper, MODEL.q_upper - 0.05)
+    np.testing.assert_allclose(limits.speed, 0.8 * MODEL.speed_limits)
 
 
 def joint_snapshot(q: np.ndarray, v: np.ndarray) -> Snapshot:

@@ -14,7 +14,7 @@ from go2_wbc.legs import JOINT_NAMES, LEGS
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.model import FLOOR, IMU_SITE, JointDynamics, build_spec, drawn_shapes
 from go2_wbc.plant.terrain import Boxes
-from go2_wbc.robot.description import find_description
+from go2_wbc.robot.description import BASE_LINK, find_description
 from go2_wbc.robot.state import JointCommand
 from tests.go2_wbc.plant.contract import DAMPED
 from tests.go2_wbc.plant.helpers import GRAVITY, STAND, fly, momentum, stand_up
@@ -219,6 +219,18 @@ def test_a_push_at_a_foot_without_a_body_acts_at_the_foot_not_at_the_calfs_centr
     plant.write(JointCommand.torque(np.zeros(12)))
     gained = momentum(robot, plant.read())[3:]
     assert gained == pytest.approx(np.cross(arm, force) * plant.control_period, rel=0.01, abs=1e-5)
+
+
+def test_a_base_of_another_name_is_pushed_by_that_or_by_ours(users_mjcf: Mjcf) -> None:
+    path = users_mjcf()
+    path.write_text(path.read_text("utf-8").replace(f'"{BASE_LINK}"', '"trunk"'), "utf-8")
+    plant, moved = MujocoPlant(path), list[np.ndarray]()
+    for at in ("trunk", BASE_LINK):
+        fly(plant, speed=0.0)
+        plant.push(np.array([30.0, 0.0, 0.0]), plant.control_period, at=at)
+        plant.write(JointCommand.torque(np.zeros(12)))
+        moved.append(plant.read().v[:3])
+    np.testing.assert_allclose(moved[0], moved[1])
 
 
 def test_friction_of_a_users_model_is_its_own_unless_asked(users_mjcf: Mjcf) -> None:
