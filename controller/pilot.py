@@ -43,6 +43,9 @@ UNMOVED = (
 )
 _log = logging.getLogger(__name__)
 
+STEP_AHEAD, STEP_TIME = VelocityCommand(0.2), 0.6
+"""How, and for how long [s], a robot goes on whose calf lies on an edge."""
+
 
 class Pilot:
     """Runs procedures on one loop.
@@ -127,12 +130,26 @@ class Pilot:
 
     def _rise(self, entry: Posture, duration: float) -> Measurements:
         self._take_posture(self._make_standing(entry, duration))
-        if self._runner.settles(modes.is_standing):
-            return self._arrive(Posture.STAND)
-        # It stands on other ground than it believed in as it began: feet slid, or left a box.
-        self._runner.stop_stepping()
-        self._take_posture(self._make_standing(Posture.STAND, HOLD_TIME))
+        is_rough = self._walker.walking.is_on_rough_ground
+        for _ in range(2 if is_rough else 1):
+            if self._runner.settles(modes.is_standing):
+                return self._arrive(Posture.STAND)
+            # It stands on other ground than it believed in: feet slid, left a box, or hang.
+            self._runner.stop_stepping()
+            hanging = 4 - int(self._loop.state.feet_in_contact.sum())
+            if is_rough and 1 <= hanging <= 2:
+                self._step_ahead()
+            self._take_posture(self._make_standing(Posture.STAND, HOLD_TIME))
         return self._settle(Posture.STAND, "stand")
+
+    def _step_ahead(self) -> None:
+        """A calf lies on an edge behind its foot, which hangs: go on until it has come off."""
+        _log.warning("stand: a foot hangs on rough ground, it goes on for a step")
+        self._walker.start("trot")
+        self._walker.follow(STEP_AHEAD)
+        self._runner.let_pass(STEP_TIME)
+        self._walker.halt()
+        self._walker.finish("stand")
 
     def sit(self) -> Measurements:
         """Sit like a dog, from any mode but fallen."""

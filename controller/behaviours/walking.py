@@ -13,6 +13,7 @@ from go2_wbc.contacts import Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.envelopes import DWELL, GaitChoice
 from go2_wbc.planning.gait_clock import time_between
+from go2_wbc.planning.ground import is_rough
 from go2_wbc.planning.height_map import HeightMap
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.planning.trunk import LEVEL, SETTLED_COMMAND, BodyPose
@@ -126,6 +127,11 @@ class Walking(Behaviour):
     def asked(self, now: float) -> VelocityCommand:
         """The command, within what a change of gait permits at ``now`` [s]."""
         return self._limit.clip(self.command) if now < self._is_limited_until else self.command
+
+    @property
+    def is_on_rough_ground(self) -> bool:
+        """Whether feet have found the ground rough, lately."""
+        return bool(is_rough(self._planner.ground))
 
     @property
     def friction(self) -> float | None:

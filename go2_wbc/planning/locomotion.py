@@ -326,6 +326,7 @@ class LocomotionPlanner:
 
     Attributes:
         sight: what has been seen of the way.
+        ground: what the feet have told of it.
     """
 
     @typed()
@@ -343,7 +344,7 @@ class LocomotionPlanner:
         self._model, self._config = model, config
         self._heights = HeightMap() if heights is None else heights
         self._state, self._command = Planner(), Command()
-        self.sight = self._state.sight
+        self.sight, self.ground = self._state.sight, self._state.ground
         self.change_gait(gait)
 
     def __repr__(self) -> str:
@@ -385,7 +386,7 @@ class LocomotionPlanner:
             feet=feet,
             planned=PlannedForces(next=-np.inf),
         )
-        self.sight = self._state.sight
+        self.sight, self.ground = self._state.sight, self._state.ground
         restart(self._state.clock, self._walk.cadence)
 
     @typed()
