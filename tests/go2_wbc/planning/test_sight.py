@@ -34,6 +34,7 @@ from go2_wbc.planning.sighted_steps import (
     NEAR,
     NEAR_ENOUGH,
     OVER,
+    POINTS,
     STEP,
     WAIT,
     WAITS,
@@ -159,7 +160,7 @@ def test_the_calf_lies_between_the_foot_and_a_knee_that_both_links_reach(seed: i
     foot = (0.1, 0.0, 0.05)
     hip = (foot[0] + along * ahead[0], foot[1] + along * ahead[1], foot[2] + d * math.sin(phi))
     knee = foot[2] + walk.link * math.sin(phi + math.acos(0.5 * d / walk.link))  # it is behind
-    lowest = foot[2] + (knee - foot[2]) / 3.0
+    lowest = foot[2] + (knee - foot[2]) / POINTS
     for height, missing in ((0.3, 0.3 + CLEARANCE - lowest), (lowest - CLEARANCE - 0.01, 0.0)):
         ground.shift = height
         assert calf_miss(ground, hip, foot, ahead, 0.0, walk) == pytest.approx(missing)
@@ -198,7 +199,10 @@ def test_a_foot_rises_before_it_goes_over_a_wall_and_is_over_it_before_it_comes_
     heights = raised(level(), 0.15, wall, (-1.0, 1.0))
     walking, foot = swinging(heights)
     foot.swing.start[2] += from_above
-    shape(0, walking._state, walking._walk, heights)
+    q = standing_q(0.3)
+    q[0] = 0.35  # so far ahead that no calf comes near the wall
+    now = MODEL.snapshot(state_of(q))
+    shape(0, now, walking._state, walking._walk, heights, (0.0, 0.4))
     assert (foot.step.begin, foot.step.end) == pytest.approx((begin, end))
 
 
