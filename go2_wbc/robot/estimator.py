@@ -273,8 +273,7 @@ class StateEstimator:
         if not 0.0 <= step <= self._config.longest_step:
             self._begin(reading)
             step = 0.0
-        for taken, name in zip(self._taken, _TAKEN, strict=True):
-            taken[:] = getattr(reading, name)
+        self._read(reading)
         q, v = np.empty(19), np.empty(18)
         if off := estimate(self._state, self._reading, step, self._numbers, q, v):
             self._forget(reading, keeps_height=off == TUMBLED)
@@ -302,6 +301,10 @@ class StateEstimator:
         for first, count, deviation in _AFTER_GYRO if turn.any() else _AFTER_FORCE:
             doubted = range(first, first + count)
             self._P[doubted, doubted] += deviation**2
+
+    def _read(self, reading: SensorReading) -> None:
+        for taken, name in zip(self._taken, _TAKEN, strict=True):
+            taken[:] = getattr(reading, name)
 
     def covariance(self) -> OdometryCovariance:
         """How sure the last state is of the base, from the covariance of the filter's errors.
