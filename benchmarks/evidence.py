@@ -78,7 +78,8 @@ class Line:
             return f"{who} fell (n {found['n']})"
         values = (found[key] for key in ("mean", "sd", "worst"))
         numbers = "; ".join("-" if value is None else self.shown.format(value) for value in values)
-        fell = f", {found['falls']} fell" if found["falls"] else ""
+        how = "missed" if "notice" in self.what else "fell"
+        fell = f", {found['falls']} {how}" if found["falls"] else ""
         return f"{numbers} (n {found['n']}{fell})"
 
 

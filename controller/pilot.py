@@ -41,10 +41,9 @@ UNMOVED = (
     "stop() comes before any time has passed since move(): the robot has not moved. Time passes in "
     "wait(2.0), not in time.sleep(2); with GO2Controller(realtime=True) in both"
 )
-_log = logging.getLogger(__name__)
-
 STEP_AHEAD, STEP_TIME = VelocityCommand(0.2), 0.6
 """How, and for how long [s], a robot goes on whose calf lies on an edge."""
+_log = logging.getLogger(__name__)
 
 
 class Pilot:
@@ -116,7 +115,8 @@ class Pilot:
             self._mode = Mode.MOVING
             tuck(self._runner)
         entry = {Mode.SITTING: Posture.SIT, Mode.LYING: Posture.LIE}.get(mode, Posture.STAND)
-        return self._rise(entry, HOLD_TIME if mode in (Mode.STANDING, Mode.WALKING) else 1.2)
+        is_up = mode in (Mode.STANDING, Mode.WALKING)
+        return self._rise(entry, HOLD_TIME if is_up else 1.2, has_walked=mode is Mode.WALKING)
 
     def take_over(self) -> Measurements:
         """Stand on the feet where they are; a robot that does not stand stays limp."""
@@ -128,16 +128,16 @@ class Pilot:
             raise Aborted(f"the robot does not stand: {why_not}", self._runner.measurements())
         return self._rise(Posture.STAND, 1.2)
 
-    def _rise(self, entry: Posture, duration: float) -> Measurements:
+    def _rise(self, entry: Posture, duration: float, *, has_walked: bool = False) -> Measurements:
         self._take_posture(self._make_standing(entry, duration))
-        is_rough = self._walker.walking.is_on_rough_ground
+        is_rough = has_walked and self._walker.walking.is_on_rough_ground
         for _ in range(2 if is_rough else 1):
             if self._runner.settles(modes.is_standing):
                 return self._arrive(Posture.STAND)
             # It stands on other ground than it believed in: feet slid, left a box, or hang.
             self._runner.stop_stepping()
             hanging = 4 - int(self._loop.state.feet_in_contact.sum())
-            if is_rough and 1 <= hanging <= 2:
+            if is_rough and 1 <= hanging <= 2 and self._loop.health.is_sound:
                 self._step_ahead()
             self._take_posture(self._make_standing(Posture.STAND, HOLD_TIME))
         return self._settle(Posture.STAND, "stand")
@@ -148,8 +148,7 @@ class Pilot:
         self._walker.start("trot")
         self._walker.follow(STEP_AHEAD)
         self._runner.let_pass(STEP_TIME)
-        self._walker.halt()
-        self._walker.finish("stand")
+        self._finish_walking("stand")
 
     def sit(self) -> Measurements:
         """Sit like a dog, from any mode but fallen."""

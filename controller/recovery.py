@@ -2,8 +2,9 @@
 
 The trunk is round: with its legs folded the robot comes to rest on its belly or on its back. The
 thighs can point past the back, so from there the legs of one side push against the ground and roll
-the robot over to the other side, onto its belly. A leg that is jammed beside the trunk after a fall
-comes free if its hip turns outwards first.
+the robot over to the other side, onto its belly. A trunk with flat sides, as the Go1's, may lie on
+one of them: once a roll to either side has failed, the legs below it push beside the back. A leg
+that is jammed beside the trunk after a fall comes free if its hip turns outwards first.
 """
 
 from __future__ import annotations

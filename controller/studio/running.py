@@ -48,7 +48,8 @@ class Runner:
         environment = {**os.environ, **ONE_THREAD}  # more threads would wait for each other, busily
         arguments = (there, self._stop, environment)
         self._process = context.Process(target=serve, args=arguments, daemon=True)
-        weakref.finalize(self, _kill, self._process)  # ahead of what one that still loads needs
+        # Also if this is interrupted: one that still loads would miss its pipe, with a traceback.
+        self._killer = weakref.finalize(self, _kill, self._process)
         start(self._process, *PRELOADED)
         there.close()
         self._is_warm = False
@@ -112,7 +113,7 @@ class Runner:
         self._end()
 
     def _end(self) -> None:
-        _kill(self._process)
+        self._killer()
         self._process.join()
         self._pipe.close()
 

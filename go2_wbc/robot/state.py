@@ -24,6 +24,14 @@ from go2_wbc.records import Array3, Array3x3, Array4, Array4x3, Array12, Array18
 from go2_wbc.robot.description import RobotProfile, find_profile
 
 
+def have_equal_fields(one: RobotState | JointCommand, other: object) -> bool:
+    """Whether both are of one class, and their arrays equal; what is no number equals itself."""
+    names = one.__dataclass_fields__
+    return type(one) is type(other) and all(
+        np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True) for name in names
+    )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotState:
     """The measured state of the robot at one instant.
@@ -46,11 +54,7 @@ class RobotState:
     foot_forces: Array4
     feet_in_contact: Bool[np.ndarray, "4"]
 
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, RobotState):
-            return NotImplemented
-        names = [part.name for part in fields(self)]
-        return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in names)
+    __eq__ = have_equal_fields
 
     def __repr__(self) -> str:
         place = ", ".join(f"{part:.3f}" for part in self.p_world_base.tolist())
@@ -173,7 +177,7 @@ class OdometryCovariance:
         return cls(np.diag(pose**2), np.diag(twist**2))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class JointCommand:
     """What the motors are told: tau + kp (q_des - q) + kd (v_des - v), clipped to the limits.
 
@@ -194,7 +198,7 @@ class JointCommand:
     kp: Array12
     kd: Array12
 
-    __repr__ = brief
+    __repr__, __eq__ = brief, have_equal_fields
 
     def asked(self, q: Array12, v: Array12) -> Array12:
         """Torques [N m] asked for at angles ``q`` and velocities ``v``, before any limit."""

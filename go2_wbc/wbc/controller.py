@@ -361,7 +361,8 @@ def check_problem(problem: Problem, solver: str) -> None:
     """Look at the rows that were made of finite arrays: gains may be too great, a task wrong.
 
     Raises:
-        QpInfeasible: for rows that are not finite, with the name of their task or constraint.
+        QpInfeasible: for rows that are not finite, or of a task beyond ``GREATEST_NUMBER``, with
+            the name of their task or constraint.
     """
     tasks, equalities, (C, lower, upper) = problem.tasks, problem.equalities, problem.bounds
     parts = [
@@ -376,6 +377,13 @@ def check_problem(problem: Problem, solver: str) -> None:
         raise QpInfeasible(solver, f"the rows of {name!r} are not finite, or too great to square")
 
 
+def _are_numbers(given: object) -> bool:
+    try:
+        return np.asarray(given).dtype.kind in "bif"
+    except ValueError:  # rows of several lengths
+        return False
+
+
 def stacked(rows: Sequence[object], sources: Sequence[Source]) -> Rows:
     """The rows of several tasks or constraints, one below the other.
 
@@ -384,7 +392,7 @@ def stacked(rows: Sequence[object], sources: Sequence[Source]) -> Rows:
     """
     parts = list[Rows]()
     for part, source in zip(rows, sources, strict=True):
-        if not isinstance(part, Rows) or not {np.asarray(x).dtype.kind for x in part} <= set("bif"):
+        if not isinstance(part, Rows) or not all(map(_are_numbers, part)):
             given = " ".join(repr(part).split())
             raise ConfigError(f"rows() of {source.name!r} must give Rows(A, b), got {given:.80}")
         A, b, count = np.shape(part.A), np.shape(part.b), np.size(part.b)

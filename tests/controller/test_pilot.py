@@ -53,6 +53,7 @@ def test_a_robot_whose_calves_lie_on_an_edge_steps_off_on_rough_ground(
     plant.place(np.concatenate([p_base, [0.0, 0.0, 0.0, 1.0], q_joints]))
     with GO2Controller(plant=plant) as go2:
         go2._pilot._walker.walking._planner.ground.rough_way = float(is_rough)
+        go2._pilot._mode = Mode.WALKING  # and has come to rest
         assert go2.stand() is is_rough
         assert ("it goes on for a step" in caplog.text) is is_rough
         if is_rough:

@@ -203,7 +203,7 @@ def flat(*values: Any) -> Iterator[np.ndarray]:  # noqa: ANN401 - of any kind
 
 
 def summed(values: Iterable[np.ndarray]) -> float:
-    """A number that each of these numbers changes by as much, whatever its size."""
+    """A number that each of these changes by its ratio times a weight, whatever its size."""
     numbers = np.concatenate([np.zeros(0), *values])
     numbers = np.nan_to_num(numbers, nan=-7.0, posinf=1e9, neginf=-1e9)
     return float(np.arcsinh(numbers / SMALL) @ np.cos(np.arange(numbers.size)))

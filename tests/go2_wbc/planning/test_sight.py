@@ -381,11 +381,8 @@ def test_the_calf_passes_the_edge_of_the_step_that_its_foot_comes_down_from(
 @pytest.mark.parametrize("height", [0.21, 0.25])
 def test_no_edge_lies_between_the_points_of_a_calf_that_are_looked_at(height: float) -> None:
     """Of three points none was near the edge of a block that the calf lay on."""
-    heights, hip, near = (
-        exact_map(Stairs(0.20, 1, 0.31, start=0.2, way=DOWN)),
-        (0.25, 0.0, height),
-        0,
-    )
+    heights = exact_map(Stairs(0.20, 1, 0.31, start=0.2, way=DOWN))
+    hip, near = (0.25, 0.0, height), 0
     walk = planner(heights)._walk
     for beyond in np.arange(0.06, 0.20, 0.01).tolist():
         for lowered in (1 / 3, 0.5, 2 / 3):

@@ -57,16 +57,22 @@ def test_parts_of_a_state_are_pinocchios_and_its_pitch_at_the_pole_is_finite() -
     np.testing.assert_array_equal(state.joint_velocities, np.arange(6.0, 18.0))
 
 
-def test_states_are_equal_whose_numbers_all_are() -> None:
+def test_states_and_commands_are_equal_whose_numbers_all_are() -> None:
     state = random_state(np.random.default_rng(0))
+    command = JointCommand(*np.random.default_rng(0).normal(size=(5, 12)))
     assert state == state.read_only()
+    assert command == replace(command, tau=command.tau.copy())
+    assert state != command
     assert state != state.q.tolist()
-    for name in ("q", "v", "tau", "foot_forces"):
-        other = getattr(state, name).copy()
-        other[-1] += 1e-9
-        assert state != replace(state, **{name: other}), name
+    for one, names in (state, ("q", "v", "tau", "foot_forces")), (command, ("tau", "q_des", "kd")):
+        for name in names:
+            other = getattr(one, name).copy()
+            other[-1] += 1e-9
+            assert one != replace(one, **{name: other}), name
     assert state != replace(state, time=state.time + 1e-3)
     assert state != replace(state, feet_in_contact=~state.feet_in_contact)
+    unknown = replace(state, v=np.full(18, np.nan))
+    assert unknown == unknown.read_only()
 
 
 def test_a_torque_command_has_no_servo_and_a_servo_no_torque() -> None:

@@ -338,6 +338,7 @@ def test_a_task_of_ones_own_with_rows_of_another_shape_is_refused(
         ((np.zeros((1, SIZE)), np.zeros(1)), r"\(array\(\[\[0"),
         (Rows(np.full((1, SIZE), None), np.zeros(1)), r"Rows\(A=array\(\[\[None, None"),
         (Rows(np.zeros((1, SIZE)), np.zeros(1, complex)), r"Rows\(A=array\(\[\[0"),
+        (Rows(cast("np.ndarray", [[1.0, 2.0], [3.0]]), np.zeros(2)), r"Rows\(A=\[\[1.0, 2.0\]"),
     ],
 )
 @pytest.mark.parametrize("solver", ["active_set", "proxqp"])
