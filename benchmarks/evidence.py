@@ -75,12 +75,11 @@ class Line:
         found = self._found(rows, name, *([] if has_fallen else ["mean"]))
         if found["mean"] is None:
             who = "all" if found["falls"] == found["n"] else found["falls"]
-            return f"{who} fell (n {found['n']})"
+            return f"{who} failed (n {found['n']})"
         values = (found[key] for key in ("mean", "sd", "worst"))
         numbers = "; ".join("-" if value is None else self.shown.format(value) for value in values)
-        how = "missed" if "notice" in self.what else "fell"
-        fell = f", {found['falls']} {how}" if found["falls"] else ""
-        return f"{numbers} (n {found['n']}{fell})"
+        failed = f", {found['falls']} failed" if found["falls"] else ""
+        return f"{numbers} (n {found['n']}{failed})"
 
 
 @dataclass(frozen=True, slots=True)

@@ -204,7 +204,7 @@ class ControlLoop:
 
     def _take(self, state: RobotState) -> bool:
         is_finite = _is_plausible(state)
-        if state.feet_in_contact.dtype != bool:
+        if state.feet_in_contact.dtype.kind != "b":
             raise TypeError(state.feet_in_contact.dtype)
         if is_finite and state.time > self.state.time:
             self._unanswered = 0

@@ -58,11 +58,11 @@ def test_a_line_of_both_states_tells_mean_deviation_worst_and_falls() -> None:
     good = {"n": 10, "mean": 0.5, "sd": 0.1, "worst": 0.75, "falls": 0}
     rows = {"a": good, "sensed-a": {**good, "worst": None, "sd": None, "falls": 3}}
     line = Line(("a", "sensed-a"), "what", "{:.2f}", "none", "2 %").text(rows)
-    assert line == "| what | 2 % | 0.50; 0.10; 0.75 (n 10) | 0.50; -; - (n 10, 3 fell) | none |"
+    assert line == "| what | 2 % | 0.50; 0.10; 0.75 (n 10) | 0.50; -; - (n 10, 3 failed) | none |"
     none = {"n": 4, "mean": None, "sd": None, "worst": None, "falls": 4}
     both, one = Line(("a", "b"), "what", "{:.2f}"), Line(("", "a"), "what", "{:.2f}")
-    assert "| all fell (n 4) |" in both.text({"a": good, "b": none})
-    assert "| 1 fell (n 4) |" in both.text({"a": good, "b": {**none, "falls": 1}})
+    assert "| all failed (n 4) |" in both.text({"a": good, "b": none})
+    assert "| 1 failed (n 4) |" in both.text({"a": good, "b": {**none, "falls": 1}})
     assert "| - |" in one.text(rows)
     with pytest.raises(ConfigError, match="no value for missing"):
         Line(("missing", ""), "what", "{:.2f}").text(rows)
