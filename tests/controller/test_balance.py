@@ -24,7 +24,7 @@ PUSH_TIME = 0.1
 HARD, HARD_ASIDE = 30.0, 22.0
 # N s; 3 m/s ahead, 2.3 m/s aside, where it fell, though not at 37.
 HARDEST, HARDEST_ASIDE = 45.0, 36.0
-HARDEST_TROTTING = 50.0
+HARDEST_SENSED, HARDEST_TROTTING = 42.0, 50.0
 SOFT = 6.0
 LIFT = 60.0  # N; a foot bears 37
 # s; in which it stands again.
@@ -69,6 +69,19 @@ def test_a_push_that_feet_in_place_cannot_hold_starts_steps(impulse: float, angl
         go2.wait(loop.behaviour.duration)
         assert loop.behaviour.is_finished(loop.snapshot)
         assert np.linalg.norm(go2.state.q[:2]) > 0.1, "it was pushed away and stands there"
+
+
+def test_a_harder_push_aside_is_held_on_its_own_sensors() -> None:
+    # At 2 m/s it counted as going as told, its feet came down too late, and it fell.
+    plant = MujocoPlant(seed=5, sensors="imu")
+    with GO2Controller(plant=plant) as go2:
+        assert go2.stand()
+        plant.push(np.array([0.0, HARDEST_SENSED / PUSH_TIME, 0.0]), PUSH_TIME)
+        go2.wait(PUSH_TIME)
+        assert go2.state.v[1] > 2.0
+        go2.wait(LIMIT)
+        assert go2.mode is Mode.STANDING
+        assert is_standing(RobotModel().snapshot(plant.truth()))
 
 
 @pytest.mark.parametrize("phase", [3, 5, 11])
