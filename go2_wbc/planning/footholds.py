@@ -85,6 +85,15 @@ def excess_velocity(now: Snapshot, s: Planner, c: Walk) -> tuple[float, float]:
 
 
 @subroutine
+def is_thrown(now: Snapshot, s: Planner, c: Walk) -> bool:
+    """Whether it goes its way faster than it is wanted to, by more than the margin."""
+    ref_x, ref_y = world_velocity(s.trunk)
+    x, y = now.v_world_com[0], now.v_world_com[1]
+    speed = max(np.hypot(x, y), TIE)
+    return speed - (x * ref_x + y * ref_y) / speed > c.config.stride_margin
+
+
+@subroutine
 def is_easy(s: Planner) -> bool:
     """Whether the way is level, and slow: legs get straight on stairs, and of fast robots."""
     x, y = s.trunk.velocity[0], s.trunk.velocity[1]

@@ -350,12 +350,18 @@ def fitted_slope(g: Ground) -> tuple[float, float]:
 
 @subroutine
 def learn_ground(
-    g: Ground, now: Snapshot, foot_radius: float, met: Bool[np.ndarray, "4"], delay: float
+    g: Ground,
+    now: Snapshot,
+    foot_radius: float,
+    met: Bool[np.ndarray, "4"],
+    delay: float,
+    tells: bool,
 ) -> None:
     """Take in where feet, of which some are ``met`` at this tick, have met the ground.
 
-    Where commands act late [s], ``now`` is when the next one does, and a foot that has come down
-    has gone on into the ground: it counts as much less far off the plane as it may have moved.
+    ``tells`` is whether their distance from the plane tells of roughness. Where commands act late
+    [s], ``now`` is when the next one does, and a foot that has come down has gone on into the
+    ground: it counts as much less far off the plane as it may have moved.
     """
     count, mean, most = 0, 0.0, 0.0
     for leg in range(4):
@@ -368,14 +374,14 @@ def learn_ground(
             count += 1
             mean += off
             most = max(most, abs(off))
-            if abs(off) > ROUGH:
+            if tells and abs(off) > ROUGH:
                 g.rise_way = FIRST_WAY if off > 0.0 else 0.0
             for i in range(3):
                 g.p_met[leg, i] = p[i]
             g.p_met[leg, 2] -= gone
     if count == 0:
         return
-    g.roughness = max(CALMING * g.roughness, most)
+    g.roughness = max(CALMING * g.roughness, most if tells else 0.0)
     g.height += GROUND_SHARE * mean / count
     a, b = fitted_slope(g)
     share = ROUGH_SLOPE_SHARE if is_rough(g) else SLOPE_SHARE

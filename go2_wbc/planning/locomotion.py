@@ -21,7 +21,7 @@ from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.contacts import TIE, Gait
 from go2_wbc.errors import CommandError
 from go2_wbc.planning.command import VelocityCommand
-from go2_wbc.planning.footholds import foothold, goes_as_told, nominal_feet
+from go2_wbc.planning.footholds import foothold, goes_as_told, is_thrown, nominal_feet
 from go2_wbc.planning.force_mpc import apply_force_plan
 from go2_wbc.planning.gait_clock import adapt, foot_phase, pace, restart
 from go2_wbc.planning.ground import (
@@ -196,7 +196,12 @@ def note_liftoffs(
     stance: Bool[np.ndarray, "4"],
     progress: Float[np.ndarray, "4"],
 ) -> None:
-    """Remember where feet leave the ground; learn of it where they meet it, or stumble."""
+    """Remember where feet leave the ground; learn of it where they meet it, or stumble.
+
+    A robot that is thrown sinks, and its feet meet level ground early, as they would meet a step:
+    that tells nothing. A trot that was pushed aside took it for rough ground for 2 s, at half its
+    speed.
+    """
     met, stumbles = np.zeros(4, dtype=np.bool_), np.zeros(4, dtype=np.bool_)
     for leg in range(4):
         foot = s.feet[leg].contact
@@ -218,8 +223,9 @@ def note_liftoffs(
             if met[leg]:
                 s.ground.p_met[leg] = now.p_world_feet[leg]
         return
-    learn_ground(s.ground, now, c.foot_radius, met, s.delay)
-    if stumbles.any():
+    tells = is_rough(s.ground) or not is_thrown(now, s, c)
+    learn_ground(s.ground, now, c.foot_radius, met, s.delay, tells)
+    if stumbles.any() and tells:
         note_stumble(s.ground)
     speed = np.hypot(s.trunk.velocity[0], s.trunk.velocity[1])
     is_fast = s.clock.is_waiting or speed > c.config.rough.speed + TIE

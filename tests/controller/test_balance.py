@@ -24,7 +24,7 @@ PUSH_TIME = 0.1
 HARD, HARD_ASIDE = 30.0, 22.0
 # N s; 3 m/s ahead, 2.3 m/s aside, where it fell, though not at 37.
 HARDEST, HARDEST_ASIDE = 45.0, 36.0
-HARDEST_SENSED, HARDEST_TROTTING = 42.0, 50.0
+HARDEST_SENSED, HARDEST_TROTTING, ASIDE_TROTTING = 42.0, 50.0, 26.0
 SOFT = 6.0
 LIFT = 60.0  # N; a foot bears 37
 # s; in which it stands again.
@@ -99,6 +99,20 @@ def test_a_trot_withstands_a_hard_push_ahead(phase: int) -> None:
         go2.wait(2.0)
         assert go2.mode is Mode.WALKING
         assert go2.state.v[0] == pytest.approx(0.5, abs=0.25)
+
+
+def test_a_trot_that_is_pushed_aside_does_not_take_the_floor_for_rough_ground() -> None:
+    plant = MujocoPlant(seed=0, sensors="imu")
+    with GO2Controller(plant=plant) as go2:
+        assert go2.stand()
+        assert go2.walk()
+        go2.move(0.5)
+        go2.wait(1.5 + 10 * GAITS["trot"].period / 16)
+        plant.push(np.array([0.0, ASIDE_TROTTING / PUSH_TIME, 0.0]), PUSH_TIME)
+        for _ in range(10):
+            go2.wait(0.1)
+            assert not go2._runner.loop.behaviour.is_on_rough_ground
+        assert go2.mode is Mode.WALKING
 
 
 def test_a_push_that_feet_in_place_hold_starts_no_step() -> None:

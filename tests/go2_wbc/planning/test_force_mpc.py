@@ -6,6 +6,7 @@ import pytest
 
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.planning.footholds import is_thrown
 from go2_wbc.planning.force_mpc import (
     excess_velocity,
     fill_contacts,
@@ -154,6 +155,26 @@ def test_within_the_margin_the_wanted_way_counts() -> None:
         velocity = wanted + margin * np.array(beyond)
         found = excess_velocity(moving(resting(), np.array([*velocity, 0.0])), planner, walk)
         np.testing.assert_allclose(found, [0.0, left], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("beyond", "thrown"),
+    [
+        ((1.1, 0.0), True),
+        ((0.9, 0.0), False),
+        ((0.0, 1.6), True),
+        ((-0.9, 0.0), False),
+        ((0.0, 0.0), False),
+    ],
+)
+def test_who_is_slower_than_it_shall_be_is_not_thrown(
+    beyond: tuple[float, float], thrown: bool
+) -> None:
+    walk, wanted, yaw = Walk.of(MODEL, GAITS["trot"], CONFIG), np.array([0.4, 0.0]), 0.7
+    planner = Planner(trunk=Trunk(velocity=np.array([*wanted, 0.0]), yaw=yaw))
+    velocity = wanted + CONFIG.stride_margin * np.array(beyond)
+    world = yaw_rotation(yaw) @ np.array([*velocity, 0.0])
+    assert is_thrown(moving(resting(), world), planner, walk) == thrown
 
 
 def test_the_attitude_of_a_thrown_robot_weighs_less() -> None:

@@ -78,9 +78,9 @@ def plane(snapshot: Snapshot) -> Ground:
     return ground_below(snapshot, MODEL.foot_radius)
 
 
-def learn(ground: Ground, feet: np.ndarray, met: np.ndarray) -> None:
+def learn(ground: Ground, feet: np.ndarray, met: np.ndarray, tells: bool = True) -> None:
     here = on_plane(np.zeros(2)).replaced(p_world_feet=feet)
-    learn_ground(ground, here, MODEL.foot_radius, met, 0.0)
+    learn_ground(ground, here, MODEL.foot_radius, met, 0.0, tells)
 
 
 def test_the_plane_at_first_is_that_through_the_feet() -> None:
@@ -172,6 +172,17 @@ def test_on_rough_ground_the_robot_brakes_harder_than_it_speeds_up_also_on_low_f
     assert haste(level, CONFIG, MOST_FRICTION, 0.0, 1.01 * slower) == ROUGH_BRAKE
 
 
+def test_feet_of_a_thrown_robot_tell_the_height_but_no_roughness() -> None:
+    feet, met = on_plane(np.zeros(2)).p_world_feet.copy(), np.ones(4, dtype=bool)
+    feet[:, 2] += 2.0 * ROUGH
+    for tells, rough, way in ((True, 2.0 * ROUGH, FIRST_WAY), (False, 0.0, 0.0)):
+        ground = plane(on_plane(np.zeros(2)))
+        learn(ground, feet, met, tells)
+        assert ground.roughness == pytest.approx(rough, abs=EXACT)
+        assert ground.rise_way == way
+        assert ground.height == pytest.approx(0.4 + GROUND_SHARE * 2.0 * ROUGH)
+
+
 def test_where_commands_act_late_the_robot_walks_slower() -> None:
     ground, velocity = plane(on_plane(np.zeros(2))), np.array([1.2, -1.6, 2.0])
     slow_down(ground, CONFIG, 0.99 * LATE, velocity)
@@ -189,7 +200,7 @@ def test_feet_that_are_foretold_below_the_ground_make_it_no_rougher() -> None:
     here = on_plane(np.zeros(2)).replaced(p_world_feet=feet, v_world_contacts=down)
     for late, low in ((0.0, 0.028), (PROMPT, 0.028), (PROMPT + 0.01, 0.008), (0.02, 0.0)):
         ground = plane(on_plane(np.zeros(2)))
-        learn_ground(ground, here, MODEL.foot_radius, np.ones(4, dtype=bool), late)
+        learn_ground(ground, here, MODEL.foot_radius, np.ones(4, dtype=bool), late, True)
         assert ground.roughness == pytest.approx(low, abs=1e-9)
         assert ground.height == pytest.approx(0.4 - GROUND_SHARE * low)
 
