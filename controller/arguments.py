@@ -48,8 +48,10 @@ def time(name: str, value: float) -> float:
 def namespace(value: str) -> str:
     """``value``; raise ConfigError if it is not a name."""
     if not isinstance(value, str) or not NAMESPACE.match(value):
+        hint = "; a plant is given as plant=..." if isinstance(value, Plant) else ""
         raise ConfigError(
-            f"namespace must be letters, digits and underscores, a letter first; got {value!r}"
+            "namespace must be letters, digits and underscores, a letter first; "
+            f"got {value!r}{hint}"
         )
     return value
 

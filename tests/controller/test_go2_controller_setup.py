@@ -1,5 +1,6 @@
 """What a controller is made of may be missing, broken or unknown: the error says what and why."""
 
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -213,6 +214,16 @@ def test_a_value_out_of_range_or_an_unknown_name_is_refused_with_what_is_valid(
 ) -> None:
     with pytest.raises(CommandError, match=message):
         call(lying)
+
+
+def test_a_plant_in_the_place_of_the_namespace_is_told_where_it_goes() -> None:
+    # In a process of its own: tests check types themselves.
+    line = "import go2_wbc, controller; controller.GO2Controller(go2_wbc.MujocoPlant())"
+    ended = subprocess.run(
+        [sys.executable, "-c", line], capture_output=True, text=True, check=False
+    )
+    assert "ConfigError: namespace must be letters" in ended.stderr
+    assert "a plant is given as plant=" in ended.stderr
 
 
 @pytest.mark.parametrize("name", ["", " ", "2nd", "robot 1", "robot1\n", "a/b", "roböt", "a-b"])
