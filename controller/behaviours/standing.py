@@ -73,7 +73,8 @@ THROWN = 0.15
 """Speed [m/s] beyond that at which it is to go on, from which on it counts as thrown: its legs may
 cross, and its gait does not hurry as knees get straight. With the 0.4 of a walk a robot counted as
 going as told while it still went at 2 m/s, and its feet came down too late, beside their places: on
-its own sensors 64 of 80 pushes of 36 N s aside were held, now 40 of 40, and 59 of 60 of 43 N s."""
+its own sensors 64 of 80 pushes of 36 N s aside were held, now 40 of 40, 29 of 30 of 43 N s, and 30
+of 30 of 50 N s."""
 SHARE_OF_NODE = 0.8
 """Part of a node of the MPC below which a foot counts as in the air. With the 0.02 of a walk a foot
 that is left far behind was to give, in the last milliseconds of its stance, what the whole node
