@@ -14,7 +14,7 @@ from typing import NoReturn
 import motions  # what is named motions.X below is imported when it is used, scipy with it
 from controller import arguments
 from controller.assembly import build_pilot
-from controller.modes import Aborted, Call, Measurements, Mode, Outcome
+from controller.modes import Aborted, Asked, Call, Measurements, Mode, Outcome, Procedure
 from controller.navigation import DriveStraight, TurnInPlace
 from controller.pacing import REASON, LogOnce
 from controller.policies.policy import Policy
@@ -163,8 +163,9 @@ class GO2Controller:
             MissingDependency: for a policy without the extra ``policies``.
         """
         self._check_open()
+        asked = self._pilot.asked()
         learned = None if policy is None else arguments.policy(policy, self._plant)
-        return self._call("walk", lambda: self._pilot.walk(gait, learned))
+        return self._call("walk", lambda: self._pilot.walk(gait, learned), asked)
 
     def move(
         self,
@@ -204,10 +205,8 @@ class GO2Controller:
         also ends ``turn_left``, ``turn_right`` and ``move_forward``, which then return False.
         """
         self._check_open()
-        if self._pilot.mode is not Mode.WALKING:
-            return
-        ends_goal = self._pilot.halt()
-        if not (ends_goal or self._runner.is_realtime or self._turn):
+        ends_goal, walks = self._pilot.halt(), self._pilot.mode is Mode.WALKING
+        if walks and not (ends_goal or self._runner.is_realtime or self._turn):
             self._call("stop", self._pilot.rest)
 
     def turn_left(self, angle: float) -> bool:
@@ -253,6 +252,7 @@ class GO2Controller:
         Raises:
             CommandError: for another side or time.
         """
+        asked = self._pilot.asked()
         if plan is None:
             own = self._model.profile.motions.get("high_five", {})
             try:
@@ -261,7 +261,7 @@ class GO2Controller:
                 raise CommandError(str(error)) from None
             with self._planning:
                 plan = motions.compile_timeline(timeline, self._model)
-        return self._call("high_five", lambda: self._pilot.play(plan, stands_up=True))
+        return self._call("high_five", lambda: self._pilot.play(plan, stands_up=True), asked)
 
     @typed("times", "check", "allow_dynamic", error=CommandError)
     def play(
@@ -293,6 +293,7 @@ class GO2Controller:
         self._check_open()
         if times < 1:
             raise CommandError(f"times must be a whole number of 1 or more, got {times!r}")
+        asked = self._pilot.asked()
         plan = self.prepare(motion, check=check)
         with self._planning:
             departed = self._checker.departure(plan)
@@ -301,7 +302,7 @@ class GO2Controller:
             runs = [self._pilot.play(plan, allow_dynamic=allow_dynamic) for _ in range(times)]
             return {**runs[-1], **departed}
 
-        return self._call("play", play)
+        return self._call("play", play, asked)
 
     @typed("check", error=CommandError)
     def prepare(self, motion: motions.Playable, *, check: bool = True) -> MotionPlan:
@@ -435,21 +436,21 @@ class GO2Controller:
     # --- how calls are made ---------------------------------------------------------------
 
     def _call(
-        self, name: str, procedure: Callable[[], Measurements], *, allow_fallen: bool = False
+        self, name: str, run: Procedure, asked: Asked | None = None, *, allow_fallen: bool = False
     ) -> bool:
-        """Run ``procedure`` to its end, one at a time in all threads; returns whether it was done.
+        """Run a procedure to its end, one at a time in all threads; returns whether it was done.
 
         Its end is noted. An error that is not of this project, or Ctrl-C, leaves the robot limp.
         """
         self._check_open()
         if self._pilot.mode is Mode.FALLEN and not allow_fallen:
             raise ModeError(f"{name}() needs a robot that has not fallen: call recover() first")
-        call = Call(name, self._runner.loop.state.time)
+        call = Call(name, self._runner.loop.state.time, asked)
         try:  # Ctrl-C may come anywhere: whose turn it is must be seen from what is stored
             running = self._turn.setdefault("call", call)  # looks and takes at once
             if running is not call:
                 raise ModeError(f"{name}() while {running.name}() is still running")
-            return self._run(call, procedure)
+            return self._run(call, run)
         except Go2WbcError:
             raise
         except BaseException as error:
@@ -466,10 +467,10 @@ class GO2Controller:
             if "call" in self._turn and self._turn["call"] is call:
                 del self._turn["call"]
 
-    def _run(self, call: Call, procedure: Callable[[], Measurements]) -> bool:
+    def _run(self, call: Call, procedure: Procedure) -> bool:
         _log.info("%s() at %.2f s", call.name, call.start)
         try:
-            self._pilot.begin()
+            self._pilot.begin(call.asked)
             measured = procedure()
         except Aborted as aborted:
             self._note(call, Outcome(False, str(aborted), measured=aborted.measured))

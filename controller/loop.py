@@ -14,12 +14,12 @@ import logging
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from math import inf, isfinite
 
 import numpy as np
 
 from controller.behaviours import DAMPING, Behaviour, Damped, Shared
+from controller.modes import Fault
 from controller.pacing import REASON
 from controller.telemetry import Telemetry
 from go2_wbc.errors import ModeError, PlantError, PlantTimeout, QpInfeasible
@@ -42,16 +42,6 @@ _log = logging.getLogger(__name__)
 
 STATE_SIZES = {"q": 19, "v": 18, "tau": 12, "foot_forces": 4, "feet_in_contact": 4}
 OLDEST_SCAN = 64  #: Ticks by which a scan may be late
-
-
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """Why the loop took the robot out of its behaviour."""
-
-    reason: str  #: in plain words
-    is_fall: bool = False  #: whether the robot has fallen
-    may_fall: bool = False
-    """Whether it went limp in the middle of balancing, so that it may yet fall."""
 
 
 class ControlLoop:
@@ -220,12 +210,16 @@ class ControlLoop:
         return False
 
     def _see(self, scan: Scan | None) -> None:
-        """Take scan and feet into the map; a plant that has never scanned has none."""
+        """Take scan and feet into the map; a plant that has never scanned has none.
+
+        A scan from before all states that are kept is left out: nothing tells where it was taken.
+        """
         past = self._past
         if scan is None and not past:
             return
         past.append(self.state)
-        if scan is not None:
+        scan = None if scan is None else scan.checked()
+        if scan is not None and scan.time > past[0].time - self.plant.control_period:
             taken = min(past, key=lambda state: abs(state.time - scan.time))
             place = taken.p_world_base, taken.R_world_base
             fuse(self.heights, scan.p_base_points, *place, scan.deviation)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -34,16 +34,37 @@ class Mode(StrEnum):
 
 
 Measurements = Mapping[str, float]  #: Measured quantities by name with unit
+Procedure = Callable[[], Measurements]  #: What a call does
 Limited = Mapping[str, tuple[float, float | None]]
 """What was measured, by name with unit: the value, and what it must stay below, if anything."""
 
 
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """Why the loop took the robot out of its behaviour."""
+
+    reason: str  #: in plain words
+    is_fall: bool = False  #: whether the robot has fallen
+    may_fall: bool = False
+    """Whether it went limp in the middle of balancing, so that it may yet fall."""
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """How things were when a call was asked for, which may have to plan or load first."""
+
+    fault: Fault | None  #: of the loop
+    cancelled: int  #: how often motions had been cancelled
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Call:
-    """A call that runs: its name, and when [s] it began."""
+    """A call that runs."""
 
     name: str
-    start: float
+    start: float  #: when [s] it began
+    asked: Asked | None = None
+    """How things were before it was planned, or what it needs was loaded; None if nothing was."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from enum import Enum
 from queue import Empty, SimpleQueue
@@ -75,13 +75,17 @@ class LogOnce:
     """Writes a warning when what it is about begins, and not again until that has ended."""
 
     def __init__(self, log: logging.Logger) -> None:
-        self._log, self._level = log, 0
+        self._log = log
+        self._levels: dict[Hashable, int] = {}
 
-    def warn(self, level: int, message: str) -> None:
-        """Write ``message`` if this is worse than it was; 0 is the end of it."""
-        if level > self._level:
+    def warn(self, level: int, message: str, about: Hashable = None) -> None:
+        """Write ``message`` if this is worse than it was; 0 is the end of it.
+
+        What is ``about`` something else is another thing to warn of.
+        """
+        if level > self._levels.get(about, 0):
             self._log.warning(message)
-        self._level = level
+        self._levels = {**self._levels, about: level} if level else {}
 
 
 @final

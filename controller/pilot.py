@@ -17,7 +17,7 @@ from controller import modes
 from controller.acceptance import Acceptance
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.standing import Standing
-from controller.modes import Aborted, Measurements, Mode
+from controller.modes import Aborted, Asked, Measurements, Mode
 from controller.navigation import Goal
 from controller.pacing import LogOnce
 from controller.policies.policy import Policy
@@ -68,7 +68,7 @@ class Pilot:
         self._asked_at, self._unmoved = -inf, LogOnce(_log)
         self._commands = threading.Lock()  # held to take one, and to begin what takes none
         self.playing: PlayPlan | None = None
-        self._must_return = False
+        self._must_return, self._cancelled = False, 0
         self._mode = Mode.LYING if self._is_on_the_ground else Mode.DAMPED
 
     @property
@@ -96,12 +96,23 @@ class Pilot:
         """The pose of the trunk that is being followed while the robot walks."""
         return self._walker.walking.pose if self.mode is Mode.WALKING else LEVEL
 
-    def begin(self) -> None:
-        """Begin a procedure: the mode is from now on what the last fault, if any, has made it."""
+    def asked(self) -> Asked:
+        """How things are as a procedure is asked for: what comes up from now on ends it."""
+        return Asked(self._loop.fault, self._cancelled)
+
+    def begin(self, asked: Asked | None = None) -> None:
+        """Begin a procedure: the mode is from now on what the last fault, if any, has made it.
+
+        Args:
+            asked: how things were when it was asked for; None for as they are.
+
+        Raises:
+            Aborted: if a fault has come up since then.
+        """
         if self._loop.fault is not None:
             self._mode = self.mode
-        self._must_return = False
-        self._runner.begin()
+        self._must_return = asked is not None and self._cancelled > asked.cancelled
+        self._runner.begin(asked)
 
     # --- postures -------------------------------------------------------------------------
 
@@ -304,10 +315,11 @@ class Pilot:
 
         The goal's own call then brings the robot to rest.
         """
-        if self._asked_at == self._loop.state.time and not self._runner.is_realtime:
-            self._unmoved.warn(1, UNMOVED)
         had_goal, self._goal = self._goal is not None, None
-        self._walker.halt()
+        if self.mode is Mode.WALKING:
+            if self._asked_at == self._loop.state.time and not self._runner.is_realtime:
+                self._unmoved.warn(1, UNMOVED)
+            self._walker.halt()
         return had_goal
 
     # --- motions --------------------------------------------------------------------------
@@ -365,6 +377,7 @@ class Pilot:
 
     def return_safely(self) -> None:
         """Let the procedure that plays a motion leave it and stand; any thread may call it."""
+        self._cancelled += 1
         self._must_return, playing = True, self.playing
         if playing is not None:
             playing.return_safely()

@@ -18,10 +18,10 @@ from weakref import WeakValueDictionary
 from controller import modes
 from controller.behaviours import Behaviour
 from controller.behaviours.standing import Standing
-from controller.loop import ControlLoop, Fault
-from controller.modes import Aborted, Limited, Measurements
+from controller.loop import ControlLoop
+from controller.modes import Aborted, Asked, Fault, Limited, Measurements
 from controller.pacing import NOT_YET, BackgroundLog, Errands, LoopEnded, LoopHangs, Pacer, Pending
-from go2_wbc.errors import ClosedError, ModeError, PlantError, PlantTimeout
+from go2_wbc.errors import ClosedError, Go2WbcError, ModeError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.state import Snapshot
 
@@ -130,10 +130,14 @@ class Runner:
         except LoopHangs:
             raise self._hanging() from None
 
-    def begin(self) -> None:
-        """Begin a call: a fault from before it may be cleared, one during it ends it.
+    def begin(self, asked: Asked | None = None) -> None:
+        """Begin a call: a fault from before it was asked may be cleared, one since then ends it.
+
+        Args:
+            asked: how things were then; None for as they are.
 
         Raises:
+            Aborted: if a fault has come up since then.
             PlantError: if the background thread has ended, since nothing would move any more.
             ModeError: from within a tick of that thread, for which time would have to pass.
         """
@@ -144,7 +148,10 @@ class Runner:
                 f"the loop in the background has ended ({self._failure}); "
                 "close this controller and make a new one"
             )
-        self._known_fault = self.loop.fault
+        fault = self.loop.fault
+        self._known_fault = fault if asked is None else asked.fault
+        if fault is not None and fault is not self._known_fault:
+            raise self._aborted(fault.reason)
 
     def engage(self, behaviour: Behaviour) -> None:
         """Switch to ``behaviour``.
@@ -233,7 +240,11 @@ class Runner:
         while True:
             self._obey()
             self.loop.tick()
-            self._after_tick()
+            try:
+                self._after_tick()
+            except Go2WbcError as error:  # its call leaves the robot as it is for one of its own
+                self.interrupt(f"{type(error).__name__} in after_tick: {error}")
+                raise
             verdict = waiting()
             if not isinstance(verdict, Pending):
                 return verdict

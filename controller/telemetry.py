@@ -108,7 +108,7 @@ class Telemetry:
         v = state.joint_velocities
         before = v if self._v_before is None else self._v_before
         note_peaks(state.tau, v, before, self._motor, self._peaks)
-        self._v_before = v
+        self._v_before = v.copy()  # a plant may reuse its arrays
 
     def note(self, solution: WbcSolution | None) -> None:
         """Add the multipliers of the tick that was recorded last; None if it had no solution."""
@@ -253,7 +253,7 @@ class SeenTerrain:
     def height(self, x: float, y: float) -> float:
         """Of the ground at a place [m]; nan where nothing has been seen."""
         z = np.empty(1)
-        heights_at(self._heights, np.array([[x, y]]), z)
+        heights_at(self._heights, np.array([[x, y]], dtype=float), z)
         return float(z[0])
 
     def points(self) -> Float[np.ndarray, "n 3"]:

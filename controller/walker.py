@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+
+import numpy as np
+
 from controller.behaviours.learned import HAND_OVER, Learned
 from controller.behaviours.walking import Walking
 from controller.modes import Limited, calm
@@ -31,14 +35,18 @@ class Walker:
         """The behaviour that walks, or will."""
         self._envelope: VelocityEnvelope | CommandRanges = self._envelope_of(self.walking)
 
-    def excess(self, command: VelocityCommand) -> tuple[int, str]:
-        """How far ``command`` is beyond the gait's envelope (0 if not, 2 by far), and in words."""
+    def excess(self, command: VelocityCommand) -> tuple[int, str, Hashable]:
+        """How far ``command`` is beyond the gait's envelope (0 if not, 2 by far), and in words.
+
+        And of what it is told: of this gait, or policy, in this direction.
+        """
         if not (excess := self._envelope.excess(command)):
-            return 0, ""
+            return 0, "", None
         name = self.walking.gait.name if self.walking.choice is None else AUTO
         whose = f"gait {name!r}" if self._policy is None else f"policy {self._policy.name}"
         told = f"{excess}; the envelope of {whose} is {self._envelope}"
-        return 1 + self._envelope.is_far(command), told
+        way = tuple(np.sign((command.linear_x, command.linear_y, command.angular_z)).tolist())
+        return 1 + self._envelope.is_far(command), told, (whose, way)
 
     @property
     def _policy(self) -> Policy | None:

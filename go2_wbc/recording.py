@@ -183,7 +183,7 @@ class Recording:
                 }
                 values |= {name: file[name] for name in ("ground", *_NOTED) if name in file}
                 labels = tuple(file["labels"].tolist())
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        except (OSError, TypeError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
             raise ConfigError(f"{path} is missing, damaged, or no recording of save()") from error
         return Recording(**values, labels=labels)
 

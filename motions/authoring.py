@@ -58,6 +58,11 @@ class Range:
     high: float
     unit: str = ""
 
+    def __post_init__(self) -> None:
+        """Raise TimelineError if it is empty."""
+        if not self.low <= self.high:
+            raise TimelineError(f"Range: low must not be above high, got {self.low}, {self.high}")
+
     def __str__(self) -> str:
         return f"{self.low:g} to {self.high:g} {self.unit}".strip()
 
@@ -70,6 +75,8 @@ class Choice:
 
     @typed(error=TimelineError)
     def __init__(self, *words: str) -> None:
+        if not words:
+            raise TimelineError("Choice: one word at least must be given")
         object.__setattr__(self, "words", words)
 
     def __str__(self) -> str:
@@ -152,7 +159,7 @@ class Motion:
             checked[name] = known[name].check(value)
         try:
             timeline = self._make(**checked)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise TimelineError(self._told(error)) from error
         if not isinstance(timeline, Timeline):
             raise TimelineError(
@@ -160,12 +167,11 @@ class Motion:
             )
         return replace(timeline, name=self.name)
 
-    def _told(self, error: Exception) -> str:
+    def _told(self, error: BaseException) -> str:
         """``error`` with the line of the motion's file that caused it."""
         file, _, first = self.source.rpartition(":")
         where = f"{self.name} ({Path(file).name}, line {last_line(error, file) or first})"
-        what = "" if isinstance(error, TimelineError) else f"{type(error).__name__}: "
-        return f"{where}: {what}{error}"
+        return f"{where}: {error if isinstance(error, TimelineError) else in_words(error)}"
 
 
 def _motion_named(module: str, name: str) -> Motion:
@@ -173,7 +179,14 @@ def _motion_named(module: str, name: str) -> Motion:
     return found
 
 
-def last_line(error: Exception, file: str) -> int | None:
+def in_words(error: BaseException) -> str:
+    """What an error of a motion's file was."""
+    if isinstance(error, SystemExit):
+        return "the file ends the program (sys.exit), which one of motions must not"
+    return f"{type(error).__name__}: {error}"
+
+
+def last_line(error: BaseException, file: str) -> int | None:
     """Line of ``file`` that was running when ``error`` came, if one was."""
     lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
     return lines[-1] if lines else None

@@ -13,7 +13,7 @@ from typing import Any
 
 from go2_wbc.arguments import typed
 from go2_wbc.errors import CommandError, TimelineError, unknown_name
-from motions.authoring import Motion, Value, last_line
+from motions.authoring import Motion, Value, in_words, last_line
 from motions.language.timeline import Timeline
 from motions.saved.files import MOTION_FORMAT, read_motion
 
@@ -121,14 +121,14 @@ def _run(file: Path, path: str, data: bytes) -> tuple[Mapping[str, Any], ast.Mod
     try:
         tree = ast.parse(data, path)
         exec(compile(tree, path, "exec"), vars(module))
-    except Exception as error:
-        raise TimelineError(f"{_place(file, error)}: {type(error).__name__}: {error}") from error
+    except (Exception, SystemExit) as error:
+        raise TimelineError(f"{_place(file, error)}: {in_words(error)}") from error
     finally:
         sys.modules.pop(module.__name__, None)
     return vars(module), tree
 
 
-def _place(file: Path, error: Exception) -> str:
+def _place(file: Path, error: BaseException) -> str:
     """``file`` and the line of it that was running, or that cannot be read."""
     path = str(file.resolve())
     line = last_line(error, path)

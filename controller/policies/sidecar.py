@@ -142,7 +142,7 @@ class Sidecar:
                 return parse(tomllib.load(file))
         except OSError as error:
             raise PolicyError(f"{path}: {error.strerror}; see the page on sidecars") from error
-        except tomllib.TOMLDecodeError as error:
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise PolicyError(f"{path} is no TOML: {error}") from error
         except PolicyError as error:
             raise PolicyError(f"{path}: {error}") from None

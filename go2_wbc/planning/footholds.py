@@ -86,7 +86,11 @@ def excess_velocity(now: Snapshot, s: Planner, c: Walk) -> tuple[float, float]:
 
 @subroutine
 def is_thrown(now: Snapshot, s: Planner, c: Walk) -> bool:
-    """Whether it goes its way faster than it is wanted to, by more than the margin."""
+    """Whether it goes its way faster than it is wanted to, by more than the margin.
+
+    Such a robot sinks, and its feet meet level ground early, as they would meet a step: a trot that
+    was pushed aside took it for rough ground for 2 s.
+    """
     ref_x, ref_y = world_velocity(s.trunk)
     x, y = now.v_world_com[0], now.v_world_com[1]
     speed = max(np.hypot(x, y), TIE)

@@ -196,12 +196,7 @@ def note_liftoffs(
     stance: Bool[np.ndarray, "4"],
     progress: Float[np.ndarray, "4"],
 ) -> None:
-    """Remember where feet leave the ground; learn of it where they meet it, or stumble.
-
-    A robot that is thrown sinks, and its feet meet level ground early, as they would meet a step:
-    that tells nothing. A trot that was pushed aside took it for rough ground for 2 s, at half its
-    speed.
-    """
+    """Remember where feet leave the ground; learn of it where they meet it, or stumble."""
     met, stumbles = np.zeros(4, dtype=np.bool_), np.zeros(4, dtype=np.bool_)
     for leg in range(4):
         foot = s.feet[leg].contact

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from math import isfinite
 
+import numpy as np
+
+from go2_wbc.errors import PlantError
 from go2_wbc.records import ArrayNx3
 from go2_wbc.robot.description import GO2
 from go2_wbc.robot.state import JointCommand, PartFault, RobotState
@@ -17,6 +21,25 @@ class Scan:
     time: float  #: plant time [s] at which it was taken
     p_base_points: ArrayNx3  #: where its rays have met something, in the base frame [m]
     deviation: float  #: standard deviation of a point's height [m]
+
+    def checked(self) -> Scan:
+        """The same, its points as double precision.
+
+        Raises:
+            PlantError: if it cannot be taken into the map.
+        """
+        try:
+            points = np.ascontiguousarray(self.p_base_points, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise PlantError(f"p_base_points of a scan must be numbers: {error}") from None
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise PlantError(f"p_base_points of a scan must be (n, 3), got {points.shape}")
+        if not (isfinite(self.time) and isfinite(self.deviation) and self.deviation > 0.0):
+            raise PlantError(
+                "time [s] of a scan must be finite, its deviation [m] above 0; "
+                f"got {self.time} and {self.deviation}"
+            )
+        return Scan(self.time, points, self.deviation)
 
 
 class Plant(ABC):

@@ -97,7 +97,7 @@ class InjectedFault:
             CommandError: for a kind or a part that does not exist, or a number that is none.
         """
         if kind not in list(FaultKind):
-            raise CommandError(unknown_name("kind of fault", kind, list(FaultKind)))
+            raise CommandError(unknown_name("kind of fault", kind, [k.value for k in FaultKind]))
         sort = FaultKind(kind)
         if not part and sort in (FaultKind.GYRO, FaultKind.ACCELEROMETER):
             part = AXES[0]
@@ -125,6 +125,7 @@ class Faults:
         self.watch: SensorWatch | None = None
         self.known: tuple[InjectedFault, ...] = ()
         self._last: SensorReading | None = None
+        self._stuck: dict[InjectedFault, float] = {}  # angles [rad] of encoders that stick
 
     def torque_shares(self, time: float) -> Float[np.ndarray, "12"] | None:
         """Share of its torque that each motor gives at ``time``; None if all are sound."""
@@ -156,7 +157,9 @@ class Faults:
             if fault.kind is FaultKind.ENCODER:
                 q[index] += fault.value
             elif fault.kind is FaultKind.ENCODER_STUCK and self._last is not None:
-                q[index], v[index] = self._last.q_joints[index], 0.0
+                before = float(self._last.q_joints[index])
+                angle = before if math.isfinite(before) else float(reading.q_joints[index])
+                q[index], v[index] = self._stuck.setdefault(fault, angle), 0.0
             elif fault.kind is FaultKind.FOOT_FORCE:
                 forces[index] = fault.value
             elif fault.kind is FaultKind.GYRO:
@@ -180,11 +183,13 @@ class Faults:
     def save(self) -> Mapping[str, Any]:
         """All that is broken, and known of it."""
         watch = None if self.watch is None else self.watch.save()
-        return {"known": self.known, "last": self._last, "watch": watch}
+        stuck = dict(self._stuck)
+        return {"known": self.known, "last": self._last, "stuck": stuck, "watch": watch}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go back to what ``save`` returned."""
         self.known, self._last = saved["known"], saved["last"]
+        self._stuck = dict(saved["stuck"])
         if self.watch is not None:
             self.watch.restart()
             if saved["watch"] is not None:

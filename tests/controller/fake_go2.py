@@ -5,12 +5,12 @@ What is called is the real ``GO2Controller``; only how a call is carried out is 
 
 import logging
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from controller.go2_controller import GO2Controller
-from controller.modes import Measurements, Mode, Outcome
+from controller.modes import Asked, Measurements, Mode, Outcome, Procedure
 from controller.pacing import LogOnce
 from controller.telemetry import Telemetry
 from go2_wbc.errors import Go2WbcError, ModeError
@@ -137,8 +137,11 @@ class FakeGo2(GO2Controller):
     def close(self) -> None:
         self.calls.append("close")
 
+    def asked(self) -> None:
+        """How things are before a motion is planned: as always."""
+
     def _call(
-        self, name: str, procedure: Callable[[], Measurements], *, allow_fallen: bool = False
+        self, name: str, run: Procedure, asked: Asked | None = None, *, allow_fallen: bool = False
     ) -> bool:
         return self._do(name)
 

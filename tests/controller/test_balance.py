@@ -12,6 +12,7 @@ from controller.behaviours.standing import (
     must_step,
     trot_against,
 )
+from controller.behaviours.walking import Walking
 from controller.modes import is_standing
 from go2_wbc.contacts import GAITS
 from go2_wbc.plant import MujocoPlant
@@ -111,7 +112,9 @@ def test_a_trot_that_is_pushed_aside_does_not_take_the_floor_for_rough_ground() 
         plant.push(np.array([0.0, ASIDE_TROTTING / PUSH_TIME, 0.0]), PUSH_TIME)
         for _ in range(10):
             go2.wait(0.1)
-            assert not go2._runner.loop.behaviour.is_on_rough_ground
+            walking = go2._runner.loop.behaviour
+            assert isinstance(walking, Walking)
+            assert not walking.is_on_rough_ground
         assert go2.mode is Mode.WALKING
 
 

@@ -5,10 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import motions
+from controller import arguments
 from controller.behaviours.plans import PlayPlan, SafeReturn, nearest_safe_instant, retimed
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
 from go2_wbc.contacts import ContactSchedule
+from go2_wbc.errors import ModeError
 from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion
@@ -50,6 +53,65 @@ def test_a_motion_that_is_cancelled_before_it_begins_is_not_played(
     assert "_checker" not in vars(go2), "it ships checked: nothing of the check is loaded for it"
     assert go2.mode is Mode.STANDING
     assert go2.progress == 0.0
+
+
+@pytest.mark.parametrize("act", ["cancel", "damp"])
+@pytest.mark.parametrize("call", ["high_five", "play"])
+def test_who_cancels_or_damps_while_a_motion_is_planned_is_obeyed(
+    go2: GO2Controller, monkeypatch: pytest.MonkeyPatch, call: str, act: str
+) -> None:
+    # Both were forgotten when the call began: it stood up, and played for 31 s.
+    assert go2.stand()
+
+    def planned(*_: object, **__: object) -> CompiledPlan:
+        getattr(go2, act)()  # as another thread may, meanwhile
+        return compile_timeline(load_motion("high_five"), RobotModel())
+
+    monkeypatch.setattr(motions, "compile_timeline", planned)
+    monkeypatch.setattr(GO2Controller, "prepare", planned)
+    before = go2.state.time
+    assert (go2.high_five() if call == "high_five" else go2.play("high_five")) is False
+    assert ("cancelled" if act == "cancel" else "damp()") in go2.last_outcome.reason
+    assert go2.mode is (Mode.STANDING if act == "cancel" else Mode.DAMPED)
+    assert go2.state.time < before + 2.0
+    assert go2.stand(), "what was pressed is over"
+
+
+def test_who_damps_while_a_policy_is_loaded_is_obeyed(
+    go2: GO2Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(arguments, "policy", lambda *_: go2.damp())
+    assert not go2.walk(policy="any.onnx")
+    assert go2.mode is Mode.DAMPED
+
+
+@pytest.mark.parametrize("moment", [0.5, 2.3])
+@pytest.mark.parametrize("call", ["turn_left", "move_forward"])
+def test_a_goal_is_ended_by_stop_before_the_robot_walks(
+    plant: WatchedPlant, go2: GO2Controller, call: str, moment: float
+) -> None:
+    plant.once_at(moment, go2.stop)
+    assert getattr(go2, call)(1.5) is False
+    assert "ended by stop()" in go2.last_outcome.reason
+    assert go2.mode is Mode.WALKING
+    assert np.hypot(*go2.state.q[:2]) < 0.1
+
+
+def test_an_error_of_ours_in_what_runs_after_a_tick_leaves_the_robot_limp(
+    plant: WatchedPlant,
+) -> None:
+    # It stayed as it was, in the middle of standing up, and said that it was moving.
+    acts = iter([lambda: go2.move(0.3)])
+
+    def after_tick() -> None:
+        if plant.inner.time > 0.6:
+            next(acts, lambda: None)()
+
+    with GO2Controller(plant=plant, after_tick=after_tick) as go2:
+        with pytest.raises(ModeError, match="needs walking mode"):
+            go2.stand()
+        assert go2.mode is Mode.DAMPED
+        assert go2.stand()
 
 
 def test_progress_grows_from_nothing_to_all_once_a_motion_has_begun(plan: CompiledPlan) -> None:

@@ -253,6 +253,12 @@ def test_a_command_beyond_the_envelope_is_clipped_and_logged(
         go2.move(0.2)
         go2.move(90.0)
         assert len(caplog.records) == 3
+        go2.move(-90.0)  # another direction, or gait, is another thing to be told
+        assert len(caplog.records) == 4
+        assert go2.walk("pace")
+        go2.move(-90.0)
+        assert "gait 'pace'" in caplog.records[-1].message
+        assert go2.walk()
     go2.move(-9.0, 9.0, linear_y=9.0)
     assert -3.0 < go2.command.linear_x < 0.0
     go2.stop()

@@ -48,6 +48,7 @@ def test_ground_that_was_seen_is_a_small_picture() -> None:
     points = step_ahead(0.2, at=0.6) - [0.0, 0.0, 0.3]
     fuse(heights, points, np.array([0.0, 0.0, 0.3]), np.eye(3), 0.01)
     shown = html_of(SeenTerrain(heights, "")) or ""
+    assert SeenTerrain(heights, "").height(1, 0) == pytest.approx(0.2, abs=0.02)
     assert shown.startswith("<img")
     assert len(shown) < LARGEST / 10
 

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from controller.behaviours import Behaviour, Damped, ServoJoints
-from controller.loop import ControlLoop, Fault
-from controller.telemetry import Telemetry
+from controller.loop import OLDEST_SCAN, ControlLoop
+from controller.modes import Fault
+from controller.telemetry import SeenTerrain, Telemetry
 from go2_wbc.contacts import find_gait
 from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible, ResidualRow
 from go2_wbc.planning.command import ZERO_COMMAND
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
+from go2_wbc.plant.base import Scan
 from go2_wbc.reference import JointReference, Reference
 from go2_wbc.robot.description import find_profile
 from go2_wbc.robot.foot_watch import PULLED, SUNK
@@ -209,6 +211,31 @@ def test_a_plant_whose_clock_stands_still_is_reported_after_the_limit(
         run(loop, 2)
     assert loop.fault == Fault("plant failed: no new state from the plant for 32 ms")
     assert is_limp(plant.commands[-1])
+
+
+@pytest.mark.parametrize("late", [0.0, 0.02, OLDEST_SCAN * PERIOD + 0.1])
+def test_a_scan_is_taken_in_unless_nobody_knows_where_it_was_taken(
+    loop: ControlLoop, plant: StillPlant, monkeypatch: pytest.MonkeyPatch, late: float
+) -> None:
+    points = np.array([[0.4, 0.1, -0.25]], dtype=np.float32)  # as lidars give them
+    monkeypatch.setattr(plant, "scan", lambda: Scan(plant.read().time - late, points, 0.01))
+    run(loop, 100)
+    seen = SeenTerrain(loop.heights, "").height(0.4, 0.1)
+    assert np.isnan(seen) == (late > 0.1)
+    assert loop.fault is None
+
+
+@pytest.mark.parametrize(
+    ("scan", "message"),
+    [
+        (Scan(np.nan, np.zeros((4, 3)), 0.01), "time .* must be finite"),
+        (Scan(0.0, np.zeros((4, 3)), np.nan), "its deviation .* above 0; got 0.0 and nan"),
+        (Scan(0.0, np.zeros((4, 3)), 0.0), "its deviation .* above 0"),
+    ],
+)
+def test_a_scan_that_cannot_be_placed_is_told_in_words(scan: Scan, message: str) -> None:
+    with pytest.raises(PlantError, match=message):
+        scan.checked()
 
 
 def test_a_slow_period_and_a_short_silence_are_borne_with(

@@ -12,8 +12,8 @@ import pytest
 
 import controller.runner
 from controller.behaviours import Damped, ServoJoints
-from controller.loop import ControlLoop, Fault
-from controller.modes import Aborted
+from controller.loop import ControlLoop
+from controller.modes import Aborted, Fault
 from controller.runner import Runner
 from controller.telemetry import Telemetry
 from go2_wbc.errors import ClosedError, ModeError, PlantTimeout

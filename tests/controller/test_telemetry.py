@@ -56,6 +56,19 @@ def test_a_recording_is_empty_without_a_tick_bears_silence_and_does_not_change_l
     assert np.array_equal(recording.q, before[1])
 
 
+def test_peaks_are_the_same_for_a_plant_that_reuses_its_arrays(model: RobotModel) -> None:
+    # The speeds of the tick before were those of this one: motors seemed to be above their limit.
+    own, reused, v = Telemetry(model, CAPACITY), Telemetry(model, CAPACITY), np.zeros(18)
+    tau = np.zeros(12)
+    tau[0] = 10.0
+    for tick in range(1, 5):
+        v[6] = 7.0 * tick
+        for telemetry, given in ((own, v.copy()), (reused, v)):
+            state = replace(lying_state(tick * PERIOD), v=given, tau=tau)
+            telemetry.record(model.snapshot(state), ALL, "")
+    assert reused.peak_motor_ratio == own.peak_motor_ratio > 0.0
+
+
 @pytest.mark.parametrize("ticks", [1, 2, CAPACITY - 1, CAPACITY, CAPACITY + 1, 3 * CAPACITY + 7])
 def test_the_newest_ticks_are_kept_in_order(model: RobotModel, ticks: int) -> None:
     recording = recorded(model, ticks).samples(rate=1 / PERIOD).recording()

@@ -9,6 +9,9 @@ import pytest
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import LIMIT_ROWS, Recording
 
+ONE_ARRAY = b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, 'shape': (1,), }"
+ONE_ARRAY = ONE_ARRAY.ljust(127) + b"\n" + bytes(8)  # as ``np.save`` writes it
+
 
 @pytest.fixture
 def recording() -> Recording:
@@ -73,7 +76,7 @@ def test_a_recording_is_saved_and_loaded_whole(recording: Recording, tmp_path: P
         np.testing.assert_array_equal(np.array(mine), np.array(its))
 
 
-@pytest.mark.parametrize("content", [None, b"", b"no archive", b"PK\x03\x04 cut"])
+@pytest.mark.parametrize("content", [None, b"", b"no archive", b"PK\x03\x04 cut", ONE_ARRAY])
 def test_a_file_that_is_no_recording_is_told_so(content: bytes | None, tmp_path: Path) -> None:
     path = tmp_path / "run.npz"
     if content is not None:

@@ -8,6 +8,7 @@ import pytest
 
 from go2_wbc.errors import TimelineError
 from motions import load_file
+from motions.authoring import Choice, Range
 
 HEAD = "from motions import Timeline, motion\n\n\n"
 NOD = """@motion
@@ -57,6 +58,7 @@ def test_two_motions_of_one_name_and_what_is_no_file_are_refused(tmp_path: Path)
         ("def broken(:\n", "mine.py, line 1: SyntaxError"),
         (HEAD + "import no_such_module\n", "mine.py, line 4: ModuleNotFoundError"),
         (HEAD + "1 / 0\n", "mine.py, line 4: ZeroDivisionError"),
+        (HEAD + "import sys; sys.exit(0)\n", "mine.py, line 4: the file ends the program"),
         (HEAD + NOD.replace("nod()", "nod(depth: float)"), "line 4: TimelineError: nod: parameter"),
     ],
 )
@@ -65,6 +67,22 @@ def test_a_file_that_does_not_load_is_named_with_the_line(
 ) -> None:
     with pytest.raises(TimelineError, match=message):
         load_file(written(tmp_path, text))
+
+
+def test_a_range_or_a_choice_of_nothing_is_refused() -> None:
+    with pytest.raises(TimelineError, match="low must not be above high, got 5, 1"):
+        Range(5, 1)
+    with pytest.raises(TimelineError, match="one word at least"):
+        Choice()
+
+
+def test_a_motion_that_ends_the_program_is_named_with_the_line(tmp_path: Path) -> None:
+    # ``go2-wbc check`` ended without a word then, and with 0, as for what can be done.
+    leaving = HEAD + NOD.replace("    return", "    raise SystemExit\n    return")
+    with pytest.raises(
+        TimelineError, match=r"nod \(mine.py, line \d+\): the file ends the program"
+    ):
+        load_file(written(tmp_path, leaving))["nod"]()
 
 
 def test_a_file_that_is_saved_twice_in_a_second_is_read_anew(

@@ -107,6 +107,9 @@ def test_a_file_that_is_none_is_refused_by_its_name(tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text("rate = ", encoding="utf-8")
     with pytest.raises(PolicyError, match=r"bad\.toml is no TOML"):
         Sidecar.load(tmp_path / "bad.toml")
+    (tmp_path / "latin.toml").write_bytes("# für".encode("latin-1"))
+    with pytest.raises(PolicyError, match=r"latin\.toml is no TOML"):
+        Sidecar.load(tmp_path / "latin.toml")
     (tmp_path / "short.toml").write_text("format = 1", encoding="utf-8")
     with pytest.raises(PolicyError, match=r"short\.toml: rate is missing|short\.toml: joints"):
         Sidecar.load(tmp_path / "short.toml")

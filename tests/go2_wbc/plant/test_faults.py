@@ -1,12 +1,15 @@
 """What is broken on a simulated robot reads, or gives, what was said; what cannot be is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from go2_wbc.errors import CommandError
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.plant.faults import FaultKind
-from go2_wbc.robot.state import JointCommand
+from go2_wbc.plant.faults import FaultKind, Faults, InjectedFault
+from go2_wbc.robot.description import find_description
+from go2_wbc.robot.state import JointCommand, SensorReading
 from tests.go2_wbc.plant.helpers import STAND, stand_up
 
 HOLD = JointCommand.servo(STAND, np.zeros(12), 60.0, 2.0)
@@ -71,6 +74,24 @@ def test_the_watch_puts_right_what_a_sensor_reads_wrong(sensors: str) -> None:
     assert np.abs(seen.v[3:6] - truth.v[3:6]).max() < 0.15
     named = {fault.part for fault in plant.sensor_faults}
     assert named == {"FL_calf_joint", "RR_foot", "gyro"}
+
+
+def test_an_encoder_that_sticks_and_is_off_reads_one_angle() -> None:
+    # The offset was added anew to what it had read before: 98 rad after two seconds.
+    faults, seen = Faults(find_description()), []
+    reading = SensorReading(
+        0.0, np.zeros(3), np.zeros(3), np.zeros(12), np.ones(12), np.zeros(12), np.zeros(4)
+    )
+    for kind, value in (
+        (FaultKind.ENCODER_STUCK, 0.0),
+        (FaultKind.ENCODER, 0.1),
+        (FaultKind.NOT_A_NUMBER, 0.0),
+    ):
+        faults.known += (InjectedFault(kind, "FL_calf_joint", 0.01, value),)
+    for tick in range(6):
+        now = replace(reading, time=0.01 * tick, q_joints=np.full(12, 0.5 * tick))
+        seen.append(faults.broken(now).q_joints[2])
+    np.testing.assert_allclose(seen, [0.0, np.nan, 0.1, 0.1, 0.1, 0.1])
 
 
 def test_one_reading_that_is_not_a_number_is_not_seen() -> None:
