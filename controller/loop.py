@@ -212,14 +212,15 @@ class ControlLoop:
     def _see(self, scan: Scan | None) -> None:
         """Take scan and feet into the map; a plant that has never scanned has none.
 
-        A scan from before all states that are kept is left out: nothing tells where it was taken.
+        One that is later than states are kept is left out: nothing tells where it was taken.
         """
         past = self._past
         if scan is None and not past:
             return
         past.append(self.state)
         scan = None if scan is None else scan.checked()
-        if scan is not None and scan.time > past[0].time - self.plant.control_period:
+        oldest = self.state.time - OLDEST_SCAN * self.plant.control_period
+        if scan is not None and scan.time > oldest:
             taken = min(past, key=lambda state: abs(state.time - scan.time))
             place = taken.p_world_base, taken.R_world_base
             fuse(self.heights, scan.p_base_points, *place, scan.deviation)

@@ -68,7 +68,7 @@ class Pilot:
         self._asked_at, self._unmoved = -inf, LogOnce(_log)
         self._commands = threading.Lock()  # held to take one, and to begin what takes none
         self.playing: PlayPlan | None = None
-        self._must_return, self._cancelled = False, 0
+        self._cancelled = self._known_cancelled = 0  # how often, and before what runs
         self._mode = Mode.LYING if self._is_on_the_ground else Mode.DAMPED
 
     @property
@@ -111,8 +111,13 @@ class Pilot:
         """
         if self._loop.fault is not None:
             self._mode = self.mode
-        self._must_return = asked is not None and self._cancelled > asked.cancelled
+        self._known_cancelled = self._cancelled if asked is None else asked.cancelled
         self._runner.begin(asked)
+
+    @property
+    def _must_return(self) -> bool:
+        """Whether what runs has been cancelled."""
+        return self._cancelled > self._known_cancelled
 
     # --- postures -------------------------------------------------------------------------
 
@@ -378,8 +383,7 @@ class Pilot:
     def return_safely(self) -> None:
         """Let the procedure that plays a motion leave it and stand; any thread may call it."""
         self._cancelled += 1
-        self._must_return, playing = True, self.playing
-        if playing is not None:
+        if (playing := self.playing) is not None:
             playing.return_safely()
 
     def _meet_entry(self, plan: MotionPlan) -> None:

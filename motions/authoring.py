@@ -182,7 +182,7 @@ def _motion_named(module: str, name: str) -> Motion:
 def in_words(error: BaseException) -> str:
     """What an error of a motion's file was."""
     if isinstance(error, SystemExit):
-        return "the file ends the program (sys.exit), which one of motions must not"
+        return "the file ends the program (sys.exit): a file of motions must not"
     return f"{type(error).__name__}: {error}"
 
 

@@ -219,7 +219,7 @@ def test_a_scan_is_taken_in_unless_nobody_knows_where_it_was_taken(
 ) -> None:
     points = np.array([[0.4, 0.1, -0.25]], dtype=np.float32)  # as lidars give them
     monkeypatch.setattr(plant, "scan", lambda: Scan(plant.read().time - late, points, 0.01))
-    run(loop, 100)
+    run(loop, 2)
     seen = SeenTerrain(loop.heights, "").height(0.4, 0.1)
     assert np.isnan(seen) == (late > 0.1)
     assert loop.fault is None
